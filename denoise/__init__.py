@@ -1,0 +1,6 @@
+"""Denoisers written in Dr.Jit, the scores of their results, and the report.
+
+Knows frames (`render.frame`) and their folders (`render.sequence`), not scenes and not Mitsuba.
+"""
+
+import render as _render  # noqa: F401  (finds LLVM before anything imports Dr.Jit)

@@ -1,0 +1,140 @@
+"""Where kernels run: finds an LLVM that Dr.Jit can use, and picks LLVM or CUDA.
+
+Dr.Jit loads LLVM at run time. With LLVM 15 it aborts the whole process on the first kernel
+(an unsupported instruction), which no `except` can catch, so the version is read before Dr.Jit
+ever sees the library. `LLVMGetVersion` exists since LLVM 16: a library without it is older.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import os
+import sys
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from .errors import InputError
+
+OLDEST_LLVM = 16
+_SET_BY_USER = os.environ.get("DRJIT_LIBLLVM_PATH")
+_ADVICE = ("install one with `pip install karellen-llvm-core` (Linux x86-64) or your system's "
+           "package manager, or set DRJIT_LIBLLVM_PATH to a libLLVM of version 16 or newer")
+
+
+@dataclass(frozen=True)
+class LLVM:
+    """A libLLVM on this machine; `version` is None where it is older than 16 or unreadable."""
+
+    path: str
+    version: tuple[int, int, int] | None
+
+    @property
+    def usable(self) -> bool:
+        return self.version is not None and self.version[0] >= OLDEST_LLVM
+
+
+def llvm_version(path: str) -> tuple[int, int, int] | None:
+    """(major, minor, patch) of a libLLVM, None if it cannot be loaded or predates 16."""
+    try:
+        get_version = ctypes.CDLL(path).LLVMGetVersion
+    except (OSError, AttributeError):
+        return None
+    parts = [ctypes.c_uint() for _ in range(3)]
+    get_version(*map(ctypes.byref, parts))
+    return parts[0].value, parts[1].value, parts[2].value
+
+
+def _candidates() -> list[str]:
+    """Paths to try: the wheel in this environment first, then the system, newest first."""
+    found = []
+    for pattern in ("libLLVM.so*", "libLLVM*.dylib", "LLVM-C.dll"):
+        found += sorted(map(str, (Path(sys.prefix) / "lib").glob(pattern)), key=len)
+    roots = ("/usr/lib", "/usr/lib64", "/usr/local/lib", "/opt/homebrew/opt", "/usr/local/opt")
+    system = [p for root in roots for pattern in ("llvm*/lib/libLLVM.so*", "llvm*/lib/libLLVM.dylib",
+                                                  "libLLVM.so*", "*/libLLVM.so*", "*/libLLVM-*.so*")
+              for p in Path(root).glob(pattern)]
+    found += [str(p) for p in sorted(system, key=_major_in_name, reverse=True)]
+    by_linker = ctypes.util.find_library("LLVM")
+    return found + ([by_linker] if by_linker else [])
+
+
+def _major_in_name(path: Path) -> int:
+    digits = "".join(c if c.isdigit() else " " for c in str(path)).split()
+    return max((int(d) for d in digits if len(d) <= 2), default=0)
+
+
+@cache
+def find_llvm() -> LLVM | None:
+    """The LLVM to use, or the best unusable one (so that a message can name it), or None.
+
+    DRJIT_LIBLLVM_PATH, when the user set it, is the only candidate.
+    """
+    unusable = None
+    for path in [_SET_BY_USER] if _SET_BY_USER else _candidates():
+        llvm = LLVM(path, llvm_version(path))
+        if llvm.usable:
+            return llvm
+        unusable = unusable or llvm
+    return unusable
+
+
+def prepare() -> None:
+    """Point Dr.Jit at a usable LLVM. Call before the first import of drjit; cheap, idempotent."""
+    if _SET_BY_USER is None and (llvm := find_llvm()) and llvm.usable:
+        os.environ["DRJIT_LIBLLVM_PATH"] = llvm.path
+
+
+def require_llvm() -> LLVM:
+    """The usable LLVM; InputError with advice where there is none."""
+    llvm = find_llvm()
+    if llvm is None:
+        raise InputError(f"no LLVM library was found, which the CPU kernels need: {_ADVICE}")
+    if not llvm.usable:
+        if _SET_BY_USER and not Path(llvm.path).exists():
+            raise InputError(f"DRJIT_LIBLLVM_PATH is {llvm.path}, which does not exist: {_ADVICE}")
+        raise InputError(f"the LLVM at {llvm.path} is older than {OLDEST_LLVM} or cannot be loaded, "
+                         f"and Dr.Jit would crash with it: {_ADVICE}")
+    return llvm
+
+
+def has_cuda() -> bool:
+    """Whether Dr.Jit finds a CUDA device and driver."""
+    import drjit as dr
+
+    return dr.has_backend(dr.JitBackend.CUDA)
+
+
+@cache
+def choose(device: str = "auto") -> str:
+    """'cuda' or 'llvm' for 'auto', 'cuda' or 'llvm'.
+
+    The environment variable ONESPP_DEVICE replaces 'auto'.
+
+    Raises:
+        InputError: the device is unknown or not usable here.
+    """
+    if device == "auto":
+        device = os.environ.get("ONESPP_DEVICE", "auto")
+    if device not in ("auto", "cuda", "llvm"):
+        raise InputError(f"unknown device '{device}': use auto, llvm or cuda")
+    if device == "llvm":
+        require_llvm()
+        return "llvm"
+    if has_cuda():
+        return "cuda"
+    if device == "cuda":
+        raise InputError("no CUDA device was found: use --device llvm")
+    require_llvm()
+    return "llvm"
+
+
+def set_threads(count: int | None) -> None:
+    """Use `count` CPU threads for kernels (None: all of them)."""
+    if count is not None:
+        if count < 1:
+            raise InputError(f"--threads is {count}: use 1 or more")
+        import drjit as dr
+
+        dr.set_thread_count(count)

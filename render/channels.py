@@ -1,0 +1,70 @@
+"""The channel table: every image that a frame can carry, written once.
+
+A new signal is one row here and one function in `render/gbuffer.py` (or one more output of
+the path tracer). Files, frames, imports and the documentation all read this table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One named image.
+
+    Attributes:
+        name: key in `Frame.images`.
+        exr: channel names in the file, in component order; their number is the number of
+            components. One component is an (h, w) image, more are (h, w, c).
+        half: stored as float16 (16-bit data loses nothing that matters there), else float32.
+            In memory everything is float32, the object ID int32.
+        background: value of a pixel whose ray hits nothing.
+        about: meaning, space and unit.
+    """
+
+    name: str
+    exr: tuple[str, ...]
+    half: bool
+    background: float
+    about: str
+
+    @property
+    def components(self) -> int:
+        return len(self.exr)
+
+
+def _rgb(layer: str) -> tuple[str, ...]:
+    return tuple(f"{layer}.{c}" for c in "RGB")
+
+
+_ROWS = (
+    Channel("color", ("R", "G", "B"), False, 0.0,
+            "radiance, linear Rec. 709; emission + direct + indirect (+ the environment)"),
+    Channel("emission", _rgb("emission"), False, 0.0,
+            "radiance that the visible surface (or the environment) emits itself"),
+    Channel("direct", _rgb("direct"), False, 0.0,
+            "light from emitters scattered once, at the first hit; not demodulated"),
+    Channel("indirect", _rgb("indirect"), False, 0.0,
+            "light scattered twice or more; not demodulated"),
+    Channel("albedo", _rgb("albedo"), True, 0.0,
+            "diffuse reflectance in [0, 1]; 1 where the surface has no diffuse part"),
+    Channel("normal", ("N.X", "N.Y", "N.Z"), False, 0.0,
+            "shading normal, world space, unit length, facing the camera"),
+    Channel("position", ("P.X", "P.Y", "P.Z"), False, 0.0,
+            "first hit, world space, scene units (float32: see `depth` far from the origin)"),
+    Channel("depth", ("Z",), False, 0.0,
+            "camera-space z of the first hit (not distance along the ray), scene units, > 0"),
+    Channel("id", ("ID",), False, -1.0,
+            "object ID: rank of the shape's name in sorted order; -1: nothing there"),
+    Channel("variance", _rgb("variance"), False, 0.0,
+            "variance of the mean that `color` holds, radiance^2 (references only)"),
+)
+
+CHANNELS = MappingProxyType({row.name: row for row in _ROWS})
+
+RADIANCE = ("color", "emission", "direct", "indirect")
+GBUFFER = ("albedo", "normal", "position", "depth", "id")
+FRAME = RADIANCE + GBUFFER
+REFERENCE = ("color", "variance")

@@ -1,0 +1,9 @@
+"""The one error whose text is meant for a person."""
+
+
+class InputError(ValueError):
+    """What the user gave cannot be used.
+
+    The message is one sentence that says what is wrong, where, and what to do. The command
+    line prints it and exits with 2; anything else that escapes is a bug and keeps its traceback.
+    """

@@ -1,0 +1,179 @@
+"""A scene description set up as a live Mitsuba scene, posed at one frame at a time.
+
+Traps that this file exists for:
+- `load_dict` reorders and merges shapes unless `parallel` and `optimize` are off;
+- a shape's index in the JIT registry is not its index in the scene, hence `id_from_registry`;
+- Mitsuba computes in float32, so everything is placed relative to `origin` (where the camera is
+  at frame 0): a scene far from the world's origin renders as well as one at it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from scenes.description import Cylinder, Disk, Mesh, Rectangle, Scene, SceneError, Shape, Sphere
+
+_ANALYTIC = {Sphere: "sphere", Rectangle: "rectangle", Disk: "disk", Cylinder: "cylinder"}
+
+
+class Stage:
+    """The Mitsuba scene of a description.
+
+    Attributes:
+        description: the scene. mi_scene: the live `mi.Scene`, in world space minus `origin`.
+        origin: (3,) float64, world space.
+        id_from_registry: UInt32 table, registry index of a shape -> object ID.
+        frame: the frame it is posed at.
+    """
+
+    def __init__(self, description: Scene, frame: float = 0) -> None:
+        self.description = description
+        self.origin = description.camera.world_from_camera_at(0)[:3, 3].copy()
+        self.frame = frame
+        self._mirrored = {s.name: _mirrors(s.world_from_object_at(frame)) for s in description.shapes}
+        scene: dict[str, Any] = {"type": "scene"}
+        for shape in description.shapes:
+            scene[shape.name] = self._load_shape(shape, frame)
+        if description.environment is not None:
+            scene["environment"] = {"type": "constant", "radiance": _rgb(description.environment)}
+        self.mi_scene = mi.load_dict(scene, parallel=False, optimize=False)
+        self._parameters = mi.traverse(self.mi_scene)
+        self.id_from_registry = self._registry_table()
+
+    def pose(self, frame: float) -> None:
+        """Move what moves to where it is at `frame`. Nothing happens if it is there already."""
+        if frame == self.frame:
+            return
+        for shape in self.description.shapes:
+            if shape.moves:
+                self._place(shape, shape.world_from_object_at(frame))
+            if callable(shape.emission):
+                key = f"{shape.name}.emitter.radiance.value"
+                self._parameters[key] = mi.Color3f(shape.emission_at(frame))
+        self._parameters.update()
+        self.frame = frame
+
+    def world_from_object(self) -> np.ndarray:
+        """(n, 4, 4) float64 by object ID, at the current frame."""
+        return np.stack([s.world_from_object_at(self.frame) for s in self.description.shapes])
+
+    def sensor(self, height: int, width: int) -> mi.Sensor:
+        """Mitsuba's own pinhole camera at the same place, for comparisons with its integrators."""
+        camera = self.description.camera
+        world_from_camera = self._local(camera.world_from_camera_at(self.frame))
+        # Mitsuba's camera has x to the left and y up.
+        return mi.load_dict({
+            "type": "perspective", "fov": camera.fov, "fov_axis": "y",
+            "near_clip": 1e-4, "far_clip": 1e6,
+            "to_world": mi.ScalarTransform4f((world_from_camera @ np.diag([-1., -1, 1, 1])).tolist()),
+            "film": {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",
+                     "rfilter": {"type": "box"}},
+        })
+
+    def _local(self, matrix: np.ndarray) -> np.ndarray:
+        """The same transform into world space minus `origin`."""
+        local = matrix.copy()
+        local[:3, 3] -= self.origin
+        return local
+
+    def _load_shape(self, shape: Shape, frame: float) -> Any:
+        emission = shape.emission_at(frame)
+        parts = {"bsdf": _plugin(shape.material)}
+        if emission is not None:
+            parts["emitter"] = {"type": "area", "radiance": _rgb(emission)}
+        local = self._local(shape.world_from_object_at(frame))
+        if isinstance(shape.geometry, Mesh):
+            return self._load_mesh(shape, local, parts)
+        return {"type": _ANALYTIC[type(shape.geometry)],
+                "to_world": mi.ScalarTransform4f(_checked(shape, local).tolist()), **parts}
+
+    def _load_mesh(self, shape: Shape, local: np.ndarray, parts: dict[str, Any]) -> mi.Mesh:
+        geometry = shape.geometry
+        assert isinstance(geometry, Mesh)
+        properties = mi.Properties()
+        for name, part in parts.items():
+            properties[name] = mi.load_dict(part)
+        mesh = mi.Mesh(shape.name, len(geometry.vertices), len(geometry.faces), properties,
+                       geometry.normals is not None, geometry.uv is not None)
+        parameters = mi.traverse(mesh)
+        if geometry.uv is not None:
+            parameters["vertex_texcoords"] = mi.Float(geometry.uv.astype(np.float32).ravel())
+        for key, value in _placed(geometry, local).items():
+            parameters[key] = value
+        parameters.update()
+        return mesh
+
+    def _place(self, shape: Shape, world_from_object: np.ndarray) -> None:
+        local = self._local(world_from_object)
+        if isinstance(shape.geometry, Mesh):
+            mirrored = _mirrors(local)
+            placed = _placed(shape.geometry, local)
+            if mirrored == self._mirrored[shape.name]:
+                del placed["faces"]
+            self._mirrored[shape.name] = mirrored
+            for key, value in placed.items():
+                self._parameters[f"{shape.name}.{key}"] = value
+        else:
+            self._parameters[f"{shape.name}.to_world"] = mi.Transform4f(_checked(shape, local).tolist())
+
+    def _registry_table(self) -> mi.UInt32:
+        registry_index = {}
+        for shape in self.mi_scene.shapes():
+            registry_index[shape.id()] = dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]
+        table = np.zeros(max(registry_index.values()) + 1, np.uint32)
+        for object_id, name in enumerate(self.description.object_names):
+            table[registry_index[name]] = object_id
+        return mi.UInt32(table)
+
+
+def _mirrors(matrix: np.ndarray) -> bool:
+    return bool(np.linalg.det(matrix[:3, :3]) < 0)
+
+
+def _checked(shape: Shape, matrix: np.ndarray) -> np.ndarray:
+    """The matrix, if Mitsuba's analytic shapes can take it."""
+    if isinstance(shape.geometry, Sphere | Cylinder):
+        sizes = np.linalg.norm(matrix[:3, :3], axis=0)
+        if sizes.max() > sizes.min() * (1 + 1e-6):
+            raise SceneError(f"shape '{shape.name}' is a {type(shape.geometry).__name__} with "
+                             f"non-uniform scale {np.round(sizes, 4).tolist()}: use a mesh")
+    return matrix
+
+
+def _placed(mesh: Mesh, matrix: np.ndarray) -> dict[str, Any]:
+    """A mesh's buffers after a transform computed in float64."""
+    linear = matrix[:3, :3]
+    faces = mesh.faces[:, ::-1] if _mirrors(matrix) else mesh.faces
+    placed: dict[str, Any] = {
+        "vertex_positions": mi.Float((mesh.vertices @ linear.T + matrix[:3, 3]).astype(np.float32).ravel()),
+        "faces": mi.UInt32(np.ascontiguousarray(faces).ravel()),
+    }
+    if mesh.normals is not None:
+        cofactors = np.linalg.inv(linear).T
+        normals = mesh.normals @ cofactors.T
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        placed["vertex_normals"] = mi.Float(normals.astype(np.float32).ravel())
+    return placed
+
+
+def _rgb(color: tuple[float, float, float]) -> dict[str, Any]:
+    return {"type": "rgb", "value": list(map(float, color))}
+
+
+def _plugin(value: Any) -> Any:
+    """A plain material as a Mitsuba dictionary: tuples become colours, arrays bitmaps."""
+    if isinstance(value, tuple) and len(value) == 3:
+        return _rgb(value)
+    if isinstance(value, np.ndarray):
+        return {"type": "bitmap", "bitmap": mi.Bitmap(value.astype(np.float32)), "raw": True}
+    if not hasattr(value, "items"):
+        return value
+    plugin = {key: _plugin(part) for key, part in value.items()}
+    if "uv_from_surface" in plugin:  # a texture's placement, a 4x4 matrix
+        plugin["to_uv"] = mi.ScalarTransform4f(np.asarray(value["uv_from_surface"]).tolist())
+        del plugin["uv_from_surface"]
+    return plugin
