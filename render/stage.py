@@ -12,10 +12,11 @@ from __future__ import annotations
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 
 from scenes.description import Cylinder, Disk, Mesh, Rectangle, Scene, SceneError, Shape, Sphere
+
+from .variant import mi
 
 _ANALYTIC = {Sphere: "sphere", Rectangle: "rectangle", Disk: "disk", Cylinder: "cylinder"}
 
@@ -118,7 +119,9 @@ class Stage:
             for key, value in placed.items():
                 self._parameters[f"{shape.name}.{key}"] = value
         else:
-            self._parameters[f"{shape.name}.to_world"] = mi.Transform4f(_checked(shape, local).tolist())
+            to_world = mi.Transform4f(_checked(shape, local).tolist())
+            dr.make_opaque(to_world)  # a literal would be a new kernel every frame
+            self._parameters[f"{shape.name}.to_world"] = to_world
 
     def _registry_table(self) -> mi.UInt32:
         registry_index = {}
@@ -169,10 +172,11 @@ def _plugin(value: Any) -> Any:
     if isinstance(value, tuple) and len(value) == 3:
         return _rgb(value)
     if isinstance(value, np.ndarray):
-        return {"type": "bitmap", "bitmap": mi.Bitmap(value.astype(np.float32)), "raw": True}
+        return _plugin({"type": "bitmap", "bitmap": value, "raw": True})
     if not hasattr(value, "items"):
         return value
-    plugin = {key: _plugin(part) for key, part in value.items()}
+    plugin = {key: mi.Bitmap(np.asarray(part, np.float32)) if key == "bitmap" else _plugin(part)
+              for key, part in value.items()}
     if "uv_from_surface" in plugin:  # a texture's placement, a 4x4 matrix
         plugin["to_uv"] = mi.ScalarTransform4f(np.asarray(value["uv_from_surface"]).tolist())
         del plugin["uv_from_surface"]

@@ -1,0 +1,134 @@
+"""The commands `render`, `import` and `export`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import click
+
+from scenes import catalog
+
+from . import backend
+from .arguments import parse_size
+from .channels import CHANNELS, FRAME
+from .errors import InputError
+from .manifest import parse_frames
+from .sequence import Sequence
+from .terminal import progress
+
+
+def use(device: str, threads: int | None) -> None:
+    """Fix the device and the number of threads. Call before anything imports Mitsuba."""
+    os.environ["ONESPP_DEVICE"] = device if device != "auto" else os.environ.get("ONESPP_DEVICE", "auto")
+    backend.choose()
+    backend.set_threads(threads)
+
+
+device_option = click.option("--device", default="auto", show_default=True, metavar="DEVICE",
+                             help="Where kernels run: auto, llvm (CPU) or cuda.")
+threads_option = click.option("--threads", type=int, metavar="N", help="CPU threads; default all.")
+frames_option = click.option("--frames", metavar="RANGE",
+                             help="As 0:20 (0 to 19), 0:20:2, 7 or 0,5,9; default all.")
+
+
+def render_options(command):
+    """Options of every command that renders."""
+    for option in reversed((
+        frames_option,
+        click.option("--size", metavar="WxH", help="Pixels, as 640x360; default the scene's."),
+        click.option("--seed", default=0, show_default=True, metavar="N",
+                     help="Seed of all random numbers."),
+        click.option("--reference-spp", type=int, metavar="N",
+                     help="Also render ground truth with N samples a pixel."),
+        click.option("--antialias", is_flag=True,
+                     help="Box-filter the reference over each pixel instead of its centre."),
+        click.option("--channels", metavar="NAMES", default=",".join(FRAME),
+                     help=f"What frames carry, of {', '.join(CHANNELS)}; default all but variance."),
+        click.option("--overwrite", is_flag=True, help="Replace another sequence in the folder."),
+        device_option, threads_option,
+    )):
+        command = option(command)
+    return command
+
+
+@click.command()
+@click.argument("scene")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder of the sequence; default data/SCENE.")
+@render_options
+def render(scene: str, out: Path | None, device: str, threads: int | None, **options) -> None:
+    """Render SCENE (a name, or a path to a scene file) at one sample a pixel.
+
+    Running the same command again renders what is missing.
+    """
+    use(device, threads)
+    sequence = render_to(scene, out, **options)
+    click.echo(f"rendered {len(sequence.frames)} frames into {sequence.folder}")
+
+
+def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: str | None, seed: int,
+              reference_spp: int | None, antialias: bool, channels: str, overwrite: bool) -> Sequence:
+    """Do what the options of a command ask."""
+    scene = catalog.load(scene_name)
+    height, width = parse_size(size) if size else (scene.height, scene.width)
+    numbers = parse_frames(frames) if frames else tuple(range(scene.frames))
+    if seed < 0:
+        raise InputError(f"--seed is {seed}: use 0 or more")
+    names = _channel_names(channels)
+    from .job import RenderJob, render_sequence  # imports Mitsuba
+
+    job = RenderJob(scene, numbers, height, width, seed, reference_spp, antialias, names)
+    with progress() as begin:
+        rendering = begin(f"render {scene.name} {width}x{height}", len(numbers))
+        refining = begin(f"reference, {reference_spp} spp", len(numbers)) if reference_spp else None
+        return render_sequence(job, out or Path("data") / scene.name, overwrite=overwrite,
+                               on_frames=rendering.advance,
+                               on_references=refining.advance if refining else _ignore)
+
+
+def _ignore(done: float, note: str) -> None:
+    pass
+
+
+def _channel_names(text: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    offered = [name for name in CHANNELS if name in FRAME]
+    unknown = [name for name in names if name not in offered]
+    if unknown or not names:
+        raise InputError(f"--channels names {unknown[0] if unknown else 'nothing'}: "
+                         f"use some of {', '.join(offered)}")
+    return tuple(name for name in offered if name in names)
+
+
+FORMATS = click.option("--format", "layout", type=click.Choice(["games202"]), default="games202",
+                       show_default=True, help="The other layout.")
+
+
+@click.command("import")
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder of the sequence; default data/NAME of the folder.")
+@FORMATS
+def import_(folder: Path, out: Path | None, layout: str) -> None:
+    """Make a sequence of FOLDER, which holds frames in another layout."""
+    from .games202 import import_games202
+
+    out = out or Path("data") / folder.resolve().name
+    sequence = import_games202(folder, out)
+    click.echo(f"imported {len(sequence.frames)} frames into {sequence.folder}")
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder for the files; default FOLDER/games202.")
+@FORMATS
+def export(folder: Path, out: Path | None, layout: str) -> None:
+    """Write the frames of the sequence in FOLDER in another layout."""
+    from .games202 import export_games202
+
+    sequence = Sequence.open(folder)
+    out = out or folder / layout
+    export_games202(sequence, out)
+    click.echo(f"exported {len(sequence.frames)} frames to {out}")

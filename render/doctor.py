@@ -1,0 +1,102 @@
+"""What will run on this machine, in words: Python, LLVM, CUDA, threads, and what to do."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from . import backend
+from .errors import InputError
+
+PACKAGES = ("mitsuba", "drjit", "OpenEXR", "numpy")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the diagnosis. `state` is 'ok', 'note' (works, but) or 'bad' (will not run)."""
+
+    subject: str
+    state: str
+    text: str
+
+
+def examine() -> Iterator[Finding]:
+    """Look at everything that a command needs; never raises, never crashes the process."""
+    for look in (_python, _packages, _llvm, _cuda, _threads, _kernel_cache, _kernel, _ffmpeg):
+        try:
+            yield from look()
+        except Exception as error:  # a diagnosis must outlive what it diagnoses
+            yield Finding(look.__name__.strip("_"), "bad", f"{type(error).__name__}: {error}")
+
+
+def _python() -> Iterator[Finding]:
+    ok = sys.version_info >= (3, 10)
+    advice = "" if ok else "; onespp needs 3.10 or newer"
+    yield Finding("Python", "ok" if ok else "bad",
+                  f"{platform.python_version()} at {sys.executable}, {platform.platform()}{advice}")
+
+
+def _packages() -> Iterator[Finding]:
+    for name in PACKAGES:
+        try:
+            yield Finding(name, "ok", importlib.metadata.version(name))
+        except importlib.metadata.PackageNotFoundError:
+            yield Finding(name, "bad", f"not installed: run `{sys.executable} -m pip install onespp`")
+
+
+def _llvm() -> Iterator[Finding]:
+    try:
+        llvm = backend.require_llvm()
+    except InputError as error:
+        yield Finding("LLVM", "bad", str(error))
+        return
+    yield Finding("LLVM", "ok", ".".join(map(str, llvm.version or ())) + f" at {llvm.path}")
+
+
+def _cuda() -> Iterator[Finding]:
+    yield (Finding("CUDA", "ok", "a device and driver were found; used by default") if backend.has_cuda()
+           else Finding("CUDA", "note", "no device or driver: kernels run on the CPU"))
+
+
+def _threads() -> Iterator[Finding]:
+    import drjit as dr
+
+    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    yield Finding("threads", "ok", f"{dr.thread_count()} for kernels, {allowed} processors allowed")
+
+
+def _kernel_cache() -> Iterator[Finding]:
+    folder = Path(os.environ.get("DRJIT_CACHE_DIR") or Path.home() / ".drjit")
+    nearest = next(p for p in (folder, *folder.parents) if p.exists())
+    if os.access(nearest, os.W_OK):
+        yield Finding("kernel cache", "ok", str(folder))
+    else:
+        yield Finding("kernel cache", "note", f"{folder} cannot be written: kernels are compiled anew "
+                      "in every process; set DRJIT_CACHE_DIR to a folder of yours")
+
+
+def _kernel() -> Iterator[Finding]:
+    """Compile and run something on the device that would be used."""
+    import drjit as dr
+
+    device = backend.choose()
+    module = {"llvm": dr.llvm, "cuda": dr.cuda}[device]
+    total = dr.sum(module.Float(dr.arange(module.UInt32, 1000)))[0]
+    yield Finding("test kernel", "ok" if total == 499500 else "bad",
+                  f"ran on {device}" if total == 499500 else f"wrong result on {device}: {total}")
+
+
+def _ffmpeg() -> Iterator[Finding]:
+    import imageio_ffmpeg
+
+    try:
+        yield Finding("ffmpeg", "ok", imageio_ffmpeg.get_ffmpeg_exe())
+    except RuntimeError:
+        yield Finding("ffmpeg", "note", "none for this platform: videos are left out; install ffmpeg")
+
+

@@ -1,0 +1,67 @@
+"""The G-buffer: what the primary hit says about the visible surface.
+
+One function a channel of `render/channels.py`; only those asked for are computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import drjit as dr
+
+from .stage import Stage
+from .variant import mi
+
+
+@dataclass
+class PrimaryHit:
+    """The first hit of a camera ray. `si` is in the stage's space (world minus its origin)."""
+
+    stage: Stage
+    si: mi.SurfaceInteraction3f
+    depth_per_length: mi.Float
+
+
+def albedo(hit: PrimaryHit) -> mi.Color3f:
+    """Diffuse reflectance, 1 where there is no diffuse lobe.
+
+    Mitsuba reports 0 for smooth conductors and an extrapolated highlight for rough ones; neither
+    can be divided by.
+    """
+    bsdf = hit.si.bsdf()
+    diffuse = mi.has_flag(bsdf.flags(), mi.BSDFFlags.DiffuseReflection)
+    reflectance = dr.clip(bsdf.eval_diffuse_reflectance(hit.si), 0, 1)
+    return dr.select(hit.si.is_valid(), dr.select(diffuse, reflectance, 1), 0)
+
+
+def normal(hit: PrimaryHit) -> mi.Vector3f:
+    """Shading normal, turned to the side that the camera sees (by the geometric normal)."""
+    si = hit.si
+    seen_from_behind = dr.dot(si.n, si.to_world(si.wi)) < 0
+    n = dr.select(seen_from_behind, -si.sh_frame.n, si.sh_frame.n)
+    return dr.select(si.is_valid(), n, 0)
+
+
+def position(hit: PrimaryHit) -> mi.Vector3f:
+    origin = mi.Vector3f(*(dr.opaque(mi.Float, value) for value in hit.stage.origin.tolist()))
+    return dr.select(hit.si.is_valid(), mi.Vector3f(hit.si.p) + origin, 0)
+
+
+def depth(hit: PrimaryHit) -> mi.Float:
+    return dr.select(hit.si.is_valid(), hit.si.t * hit.depth_per_length, 0)
+
+
+def object_id(hit: PrimaryHit) -> mi.Int32:
+    valid = hit.si.is_valid()
+    index = dr.reinterpret_array(mi.UInt32, hit.si.shape)
+    return dr.select(valid, mi.Int32(dr.gather(mi.UInt32, hit.stage.id_from_registry, index, valid)), -1)
+
+
+GBUFFER: dict[str, Callable[[PrimaryHit], mi.Float | mi.Vector3f | mi.Color3f | mi.Int32]] = {
+    "albedo": albedo,
+    "normal": normal,
+    "position": position,
+    "depth": depth,
+    "id": object_id,
+}

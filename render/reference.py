@@ -1,0 +1,86 @@
+"""The reference: the frame's own estimator with many samples, through the same pixel centres.
+
+Rendered in independent passes, so that it can show progress, be stopped and continued, and say
+how noisy it is itself.
+
+Symbols: n_k samples and m_k mean of pass k; N = sum of n_k; m overall mean; K passes. The variance
+of the mean is estimated between passes,
+
+    Var[m] = 1/N * sum_k n_k (m_k - m)^2 / (K - 1),
+
+which holds for any estimator inside a pass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import InputError
+from .renderer import Renderer
+from .sequence import Reference
+
+LARGEST_PASS = 64  # samples; float32 sums inside a pass stay exact to ~1e-6
+FEWEST_PASSES = 8  # so that the variance has a few degrees of freedom
+
+
+@dataclass
+class Progress:
+    """Sums over the passes done so far, float64 (h, w, 3). Enough to go on from.
+
+    total: sum n_k m_k. squares: sum n_k m_k^2.
+    """
+
+    total: np.ndarray
+    squares: np.ndarray
+    passes: int = 0
+    samples: int = 0
+
+    @classmethod
+    def start(cls, height: int, width: int) -> Progress:
+        return cls(np.zeros((height, width, 3)), np.zeros((height, width, 3)))
+
+    def add(self, sample_sum: np.ndarray, samples: int) -> None:
+        total = sample_sum.astype(np.float64)
+        self.total += total
+        self.squares += total * total / samples
+        self.passes += 1
+        self.samples += samples
+
+    def reference(self) -> Reference:
+        mean = self.total / self.samples
+        spread = np.maximum(self.squares - self.samples * mean * mean, 0)
+        variance = spread / ((self.passes - 1) * self.samples)
+        return Reference(mean.astype(np.float32), variance.astype(np.float32), self.samples)
+
+
+def pass_sizes(spp: int) -> list[int]:
+    """Samples of each pass; their number depends on `spp` alone.
+
+    Raises:
+        InputError: fewer than 2 samples, which have no variance.
+    """
+    if spp < 2:
+        raise InputError(f"a reference of {spp} spp has no variance: use 2 spp or more")
+    passes = min(spp, max(FEWEST_PASSES, -(-spp // LARGEST_PASS)))
+    size, larger = divmod(spp, passes)
+    return [size + 1] * larger + [size] * (passes - larger)
+
+
+def render_reference(renderer: Renderer, index: int, seed: int, spp: int, *,
+                     antialias: bool = False, progress: Progress | None = None,
+                     after_pass: Callable[[Progress], None] = lambda progress: None) -> Reference:
+    """The reference of one frame.
+
+    Args:
+        progress: what an earlier, interrupted call had done; the result has the same bytes as
+            an undisturbed one.
+        after_pass: called after every pass, to show or save the progress.
+    """
+    progress = progress or Progress.start(renderer.height, renderer.width)
+    for size in pass_sizes(spp)[progress.passes:]:
+        progress.add(renderer.sample_sum(index, seed, progress.samples, size, antialias), size)
+        after_pass(progress)
+    return progress.reference()

@@ -1,0 +1,122 @@
+"""Renders frames of a scene: radiance and G-buffer from one primary hit, in one kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import drjit as dr
+import numpy as np
+
+from scenes.description import Scene
+
+from .channels import FRAME, RADIANCE
+from .errors import InputError
+from .frame import Frame
+from .gbuffer import GBUFFER, PrimaryHit
+from .path import trace
+from .rays import camera_matrices, pixel_rays
+from .sampler import FRAME_STREAM, REFERENCE_STREAM, Pcg, keys_from_seed
+from .stage import Stage
+from .variant import mi
+
+
+class Renderer:
+    """A scene at one size, ready to render any of its frames in any order.
+
+    Raises:
+        InputError: a size below 1x1.
+        SceneError: a scene that Mitsuba cannot build.
+    """
+
+    def __init__(self, scene: Scene, height: int, width: int) -> None:
+        if height < 1 or width < 1:
+            raise InputError(f"the size {width}x{height} is empty: use at least 1x1")
+        self.scene, self.height, self.width = scene, height, width
+        self.stage = Stage(scene)
+
+    def frame(self, index: int, seed: int = 0, channels: Sequence[str] = FRAME) -> Frame:
+        """One frame at 1 spp: one kernel, only the channels asked for.
+
+        The result depends on (scene, index, seed, size) alone.
+        """
+        self.stage.pose(index)
+        planes = self._trace_frame(index, seed, channels)
+        dr.eval(planes)
+        matrices = camera_matrices(self.scene.camera, index, self.height, self.width)
+        images = {name: self._image(value) for name, value in planes.items()}
+        return Frame(index, images, matrices.camera_from_world, matrices.screen_from_world,
+                     self.stage.world_from_object())
+
+    def sample_sum(self, index: int, seed: int, first: int, count: int,
+                   antialias: bool = False) -> np.ndarray:
+        """Sum of reference samples first ... first + count - 1 of every pixel of a frame.
+
+        Any split of a range of samples into calls draws the same samples.
+
+        Args:
+            antialias: samples spread over the pixel (box filter) instead of its centre.
+        Returns:
+            (h, w, 3) float32, linear radiance times `count`.
+        """
+        self.stage.pose(index)
+        with dr.suspend_grad():
+            color = self._trace_samples(index, seed, first, count, antialias)
+        dr.eval(color)
+        return self._image(color)
+
+    def _trace_frame(self, index: int, seed: int, channels: Sequence[str]) -> dict:
+        with dr.suspend_grad():
+            scene = self.stage.mi_scene
+            pixel = dr.arange(mi.UInt32, self.height * self.width)
+            rays = pixel_rays(self.stage, self.height, self.width)
+            ray, depth_per_length = rays.at(*self._centres(pixel))
+            pi = scene.ray_intersect_preliminary(ray, coherent=True)
+            planes = {}
+            if set(channels) & set(RADIANCE):
+                sampler = Pcg(keys_from_seed(seed, FRAME_STREAM, index), pixel, mi.UInt32(0))
+                radiance = trace(scene, ray, pi, sampler, self.scene.max_depth)
+                planes = {
+                    "color": radiance.emission + radiance.direct + radiance.indirect,
+                    "emission": radiance.emission,
+                    "direct": radiance.direct,
+                    "indirect": radiance.indirect,
+                }
+            if set(channels) & set(GBUFFER):
+                hit = PrimaryHit(self.stage, pi.compute_surface_interaction(ray), depth_per_length)
+                planes |= {name: GBUFFER[name](hit) for name in channels if name in GBUFFER}
+            return {name: planes[name] for name in channels}
+
+    @dr.syntax
+    def _trace_samples(self, index: int, seed: int, first: int, count: int, antialias: bool):
+        scene = self.stage.mi_scene
+        pixel = dr.arange(mi.UInt32, self.height * self.width)
+        rays = pixel_rays(self.stage, self.height, self.width)
+        keys = keys_from_seed(seed, REFERENCE_STREAM, index)
+        x, y = self._centres(pixel)
+        centre_ray, _ = rays.at(x, y)
+        centre_pi = scene.ray_intersect_preliminary(centre_ray, coherent=True)
+        sample = dr.opaque(mi.UInt32, first)
+        end = dr.opaque(mi.UInt32, first + count)
+        color = mi.Color3f(0)
+        while dr.hint(sample < end, exclude=[scene, rays]):
+            sampler = Pcg(keys, pixel, sample)
+            ray, pi = centre_ray, centre_pi
+            if dr.hint(antialias, mode="scalar"):
+                jitter = sampler.next_2d()
+                ray, _ = rays.at(x + jitter.x - 0.5, y + jitter.y - 0.5)
+                pi = scene.ray_intersect_preliminary(ray, coherent=True)
+            radiance = trace(scene, ray, pi, sampler, self.scene.max_depth)
+            color += radiance.emission + radiance.direct + radiance.indirect
+            sample += 1
+        return color
+
+    def _centres(self, pixel: mi.UInt32) -> tuple[mi.Float, mi.Float]:
+        row = pixel // self.width
+        return mi.Float(pixel - row * self.width) + 0.5, mi.Float(row) + 0.5
+
+    def _image(self, value: object) -> np.ndarray:
+        """(h, w) or (h, w, 3) NumPy copy of evaluated planes."""
+        size = (self.height, self.width)
+        planes = [np.broadcast_to(plane.numpy(), self.height * self.width).reshape(size)
+                  for plane in (value if dr.depth_v(value) > 1 else [value])]
+        return np.stack(planes, -1) if len(planes) > 1 else planes[0].copy()

@@ -1,0 +1,119 @@
+"""What every command shares: progress that suits the terminal, and errors in one sentence."""
+
+from __future__ import annotations
+
+import errno
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+import click
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.progress import Progress as Bar
+
+from .errors import InputError
+
+SECONDS_BETWEEN_LINES = 5.0
+BAD_INPUT, INTERRUPTED = 2, 130
+
+
+class Steps:
+    """One part of a job: `advance(done)` with what is done so far, in the part's own unit."""
+
+    def __init__(self, title: str, total: float, bar: Bar | None) -> None:
+        self.title, self.total, self._bar = title, total, bar
+        self._started: float | None = None
+        self._shown = time.monotonic()
+        self._task = bar.add_task(title, total=total, start=False) if bar else None
+
+    def advance(self, done: float, note: str = "") -> None:
+        """`note` says a word more, such as a file's name."""
+        if self._bar is not None and self._task is not None:
+            if self._started is None:
+                self._bar.start_task(self._task)
+            self._bar.update(self._task, completed=done, description=f"{self.title} {note}".strip())
+        now = time.monotonic()
+        self._started = self._started or now
+        last = done >= self.total
+        if self._bar is None and (last or now - self._shown >= SECONDS_BETWEEN_LINES):
+            self._shown = now
+            left = (now - self._started) * (self.total - done) / done if done else 0
+            ending = "" if last or not left else f", {left:.0f} s left"
+            click.echo(f"{self.title}: {done:.4g} of {self.total:g} {note}".rstrip() + ending, err=True)
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str, float], Steps]]:
+    """Yields `begin(title, total)`, which starts a part of a job.
+
+    Shown as bars with an ETA on a terminal, as a plain line every few seconds elsewhere (stderr).
+    """
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda title, total: Steps(title, total, None)
+        return
+    with Bar(TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(),
+             TimeElapsedColumn(), TimeRemainingColumn(), console=console) as bar:
+        yield lambda title, total: Steps(title, total, bar)
+
+
+def run(command: click.Command, arguments: Sequence[str] | None = None, name: str = "onespp") -> None:
+    """Run a command line and exit: 0 done, 2 bad input, 130 interrupted.
+
+    SIGTERM stops a job as Ctrl-C does, so that what was finished is kept. Errors that are not
+    the user's keep their traceback: they are bugs.
+    """
+    from scenes.description import SceneError
+
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        command.main(args=list(arguments) if arguments is not None else None, prog_name=name,
+                     standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(BAD_INPUT)
+    except (InputError, SceneError) as error:
+        _stop(str(error))
+    except (click.Abort, KeyboardInterrupt):
+        click.echo(f"{name}: stopped; what was finished is kept, the same command goes on from there",
+                   err=True)
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        sys.stderr.close()  # the reader of our output has gone, as in `onespp ... | head`
+        sys.exit(0)
+    except OSError as error:
+        if error.errno not in _REASONS:
+            raise
+        where = f" at {error.filename}" if error.filename else ""
+        _stop(_REASONS[error.errno].format(where=where))
+
+
+_REASONS = {
+    errno.ENOSPC: "the disk is full{where}: free some space, then run the same command again",
+    errno.EDQUOT: "the disk quota is used up{where}: free some space, then run the same command again",
+    errno.EACCES: "permission denied{where}: choose another --out, or change the folder's permissions",
+    errno.EPERM: "operation not permitted{where}: choose another --out",
+    errno.EROFS: "the file system is read-only{where}: choose another --out",
+    errno.ENOTDIR: "a file is in the way of a folder{where}: choose another --out",
+    errno.EISDIR: "a folder is in the way of a file{where}: choose another --out",
+    errno.EFBIG: "a file would be larger than allowed{where}: choose another --out",
+    errno.EIO: "the disk reported an error{where}: check it, then run the same command again",
+}
+
+
+def _interrupt(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _stop(sentence: str) -> None:
+    click.echo(f"onespp: {sentence}", err=True)
+    sys.exit(BAD_INPUT)
