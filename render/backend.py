@@ -52,9 +52,9 @@ def _candidates() -> list[str]:
     for pattern in ("libLLVM.so*", "libLLVM*.dylib", "LLVM-C.dll"):
         found += sorted(map(str, (Path(sys.prefix) / "lib").glob(pattern)), key=len)
     roots = ("/usr/lib", "/usr/lib64", "/usr/local/lib", "/opt/homebrew/opt", "/usr/local/opt")
-    system = [p for root in roots for pattern in ("llvm*/lib/libLLVM.so*", "llvm*/lib/libLLVM.dylib",
-                                                  "libLLVM.so*", "*/libLLVM.so*", "*/libLLVM-*.so*")
-              for p in Path(root).glob(pattern)]
+    patterns = ("llvm*/lib/libLLVM.so*", "llvm*/lib/libLLVM.dylib", "libLLVM.so*", "*/libLLVM.so*",
+                "*/libLLVM-*.so*")
+    system = [path for root in roots for pattern in patterns for path in Path(root).glob(pattern)]
     found += [str(p) for p in sorted(system, key=_major_in_name, reverse=True)]
     by_linker = ctypes.util.find_library("LLVM")
     return found + ([by_linker] if by_linker else [])
@@ -93,17 +93,24 @@ def require_llvm() -> LLVM:
         raise InputError(f"no LLVM library was found, which the CPU kernels need: {_ADVICE}")
     if not llvm.usable:
         if _SET_BY_USER and not Path(llvm.path).exists():
-            raise InputError(f"DRJIT_LIBLLVM_PATH is {llvm.path}, which does not exist: {_ADVICE}")
-        raise InputError(f"the LLVM at {llvm.path} is older than {OLDEST_LLVM} or cannot be loaded, "
-                         f"and Dr.Jit would crash with it: {_ADVICE}")
+            raise InputError(f"DRJIT_LIBLLVM_PATH is {llvm.path}, which is not there: {_ADVICE}")
+        raise InputError(f"the LLVM at {llvm.path} is older than {OLDEST_LLVM} or cannot be "
+                         f"loaded, and Dr.Jit would crash with it: {_ADVICE}")
     return llvm
 
 
 def has_cuda() -> bool:
-    """Whether Dr.Jit finds a CUDA device and driver."""
-    import drjit as dr
+    """Whether there is a CUDA driver with a device.
 
-    return dr.has_backend(dr.JitBackend.CUDA)
+    Asks the driver itself: Dr.Jit would load LLVM first, and complain about a wrong one.
+    """
+    try:
+        driver = ctypes.CDLL("nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1")
+    except OSError:
+        return False
+    count = ctypes.c_int()
+    return (driver.cuInit(0) == 0 and driver.cuDeviceGetCount(ctypes.byref(count)) == 0
+            and count.value > 0)
 
 
 @cache

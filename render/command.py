@@ -11,7 +11,7 @@ from scenes import catalog
 
 from . import backend
 from .arguments import parse_size
-from .channels import CHANNELS, FRAME
+from .channels import FRAME
 from .errors import InputError
 from .manifest import parse_frames
 from .sequence import Sequence
@@ -20,8 +20,9 @@ from .terminal import progress
 
 def use(device: str, threads: int | None) -> None:
     """Fix the device and the number of threads. Call before anything imports Mitsuba."""
-    os.environ["ONESPP_DEVICE"] = device if device != "auto" else os.environ.get("ONESPP_DEVICE", "auto")
-    backend.choose()
+    chosen = backend.choose(device)
+    if device != "auto":
+        os.environ["ONESPP_DEVICE"] = chosen
     backend.set_threads(threads)
 
 
@@ -44,7 +45,7 @@ def render_options(command):
         click.option("--antialias", is_flag=True,
                      help="Box-filter the reference over each pixel instead of its centre."),
         click.option("--channels", metavar="NAMES", default=",".join(FRAME),
-                     help=f"What frames carry, of {', '.join(CHANNELS)}; default all but variance."),
+                     help=f"What frames carry, of {', '.join(FRAME)}; default all."),
         click.option("--overwrite", is_flag=True, help="Replace another sequence in the folder."),
         device_option, threads_option,
     )):
@@ -68,7 +69,8 @@ def render(scene: str, out: Path | None, device: str, threads: int | None, **opt
 
 
 def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: str | None, seed: int,
-              reference_spp: int | None, antialias: bool, channels: str, overwrite: bool) -> Sequence:
+              reference_spp: int | None, antialias: bool, channels: str,
+              overwrite: bool) -> Sequence:
     """Do what the options of a command ask."""
     scene = catalog.load(scene_name)
     height, width = parse_size(size) if size else (scene.height, scene.width)
@@ -92,13 +94,12 @@ def _ignore(done: float, note: str) -> None:
 
 
 def _channel_names(text: str) -> tuple[str, ...]:
-    names = tuple(name.strip() for name in text.split(",") if name.strip())
-    offered = [name for name in CHANNELS if name in FRAME]
-    unknown = [name for name in names if name not in offered]
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    unknown = [name for name in names if name not in FRAME]
     if unknown or not names:
         raise InputError(f"--channels names {unknown[0] if unknown else 'nothing'}: "
-                         f"use some of {', '.join(offered)}")
-    return tuple(name for name in offered if name in names)
+                         f"use some of {', '.join(FRAME)}")
+    return tuple(name for name in FRAME if name in names)
 
 
 FORMATS = click.option("--format", "layout", type=click.Choice(["games202"]), default="games202",

@@ -46,7 +46,8 @@ def _packages() -> Iterator[Finding]:
         try:
             yield Finding(name, "ok", importlib.metadata.version(name))
         except importlib.metadata.PackageNotFoundError:
-            yield Finding(name, "bad", f"not installed: run `{sys.executable} -m pip install onespp`")
+            yield Finding(name, "bad",
+                          f"not installed: run `{sys.executable} -m pip install onespp`")
 
 
 def _llvm() -> Iterator[Finding]:
@@ -59,14 +60,17 @@ def _llvm() -> Iterator[Finding]:
 
 
 def _cuda() -> Iterator[Finding]:
-    yield (Finding("CUDA", "ok", "a device and driver were found; used by default") if backend.has_cuda()
-           else Finding("CUDA", "note", "no device or driver: kernels run on the CPU"))
+    if backend.has_cuda():
+        yield Finding("CUDA", "ok", "a device and driver were found; used by default")
+    else:
+        yield Finding("CUDA", "note", "no device or driver: kernels run on the CPU")
 
 
 def _threads() -> Iterator[Finding]:
     import drjit as dr
 
-    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    affinity = getattr(os, "sched_getaffinity", None)
+    allowed = len(affinity(0)) if affinity else os.cpu_count()
     yield Finding("threads", "ok", f"{dr.thread_count()} for kernels, {allowed} processors allowed")
 
 
@@ -76,8 +80,9 @@ def _kernel_cache() -> Iterator[Finding]:
     if os.access(nearest, os.W_OK):
         yield Finding("kernel cache", "ok", str(folder))
     else:
-        yield Finding("kernel cache", "note", f"{folder} cannot be written: kernels are compiled anew "
-                      "in every process; set DRJIT_CACHE_DIR to a folder of yours")
+        yield Finding("kernel cache", "note",
+                      f"{folder} cannot be written: kernels are compiled anew in every process; "
+                      "set DRJIT_CACHE_DIR to a folder of yours")
 
 
 def _kernel() -> Iterator[Finding]:
@@ -97,6 +102,7 @@ def _ffmpeg() -> Iterator[Finding]:
     try:
         yield Finding("ffmpeg", "ok", imageio_ffmpeg.get_ffmpeg_exe())
     except RuntimeError:
-        yield Finding("ffmpeg", "note", "none for this platform: videos are left out; install ffmpeg")
+        yield Finding("ffmpeg", "note",
+                      "none for this platform: videos are left out; install ffmpeg")
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 
@@ -54,8 +55,9 @@ def depth(hit: PrimaryHit) -> mi.Float:
 
 def object_id(hit: PrimaryHit) -> mi.Int32:
     valid = hit.si.is_valid()
-    index = dr.reinterpret_array(mi.UInt32, hit.si.shape)
-    return dr.select(valid, mi.Int32(dr.gather(mi.UInt32, hit.stage.id_from_registry, index, valid)), -1)
+    index: Any = dr.reinterpret_array(mi.UInt32, hit.si.shape)
+    number = dr.gather(mi.UInt32, hit.stage.id_from_registry, index, valid)
+    return dr.select(valid, mi.Int32(number), -1)
 
 
 GBUFFER: dict[str, Callable[[PrimaryHit], mi.Float | mi.Vector3f | mi.Color3f | mi.Int32]] = {

@@ -1,4 +1,4 @@
-"""Renders an animation into a folder: its frames, then their references; goes on where it stopped."""
+"""Renders an animation into a folder: frames, then references; goes on where it stopped."""
 
 from __future__ import annotations
 
@@ -17,12 +17,15 @@ from scenes.fingerprint import fingerprint
 
 from . import backend
 from .channels import FRAME
+from .json_file import checked
 from .manifest import Manifest
 from .reference import Progress, pass_sizes, render_reference
 from .renderer import Renderer
 from .sequence import Sequence as FrameSequence
 
 SECONDS_BETWEEN_SAVES = 10.0
+
+_SAVED = {"total", "squares", "passes", "samples", "spp", "antialias"}
 
 Report = Callable[[float, str], None]
 
@@ -48,7 +51,8 @@ class RenderJob:
     channels: Sequence[str] = FRAME
 
     def manifest(self) -> Manifest:
-        return Manifest(
+        return checked(
+            Manifest, "the sequence",
             scene=self.scene.name, about=self.scene.about, fingerprint=fingerprint(self.scene),
             frames=tuple(self.frames), width=self.width, height=self.height, fps=self.scene.fps,
             seed=self.seed, reference_spp=self.reference_spp, max_depth=self.scene.max_depth,
@@ -112,19 +116,20 @@ def _has_reference(sequence: FrameSequence, index: int, job: RenderJob) -> bool:
 def _render_reference(job: RenderJob, sequence: FrameSequence, renderer: Renderer, index: int,
                       provenance: dict[str, str], report: Callable[[float], None]) -> None:
     """One reference; its progress is kept on disk every few seconds and when interrupted."""
-    assert job.reference_spp is not None
+    spp = job.reference_spp
+    assert spp is not None
     progress = _saved_progress(job, sequence, index) or Progress.start(job.height, job.width)
     saved = time.monotonic()
 
     def after_pass(progress: Progress) -> None:
         nonlocal saved
-        report(progress.samples / job.reference_spp)
+        report(progress.samples / spp)
         if time.monotonic() - saved > SECONDS_BETWEEN_SAVES:
             _save_progress(job, sequence, index, progress)
             saved = time.monotonic()
 
     try:
-        reference = render_reference(renderer, index, job.seed, job.reference_spp,
+        reference = render_reference(renderer, index, job.seed, spp,
                                      antialias=job.antialias, progress=progress,
                                      after_pass=after_pass)
     except KeyboardInterrupt:
@@ -145,7 +150,7 @@ def _save_progress(job: RenderJob, sequence: FrameSequence, index: int, progress
 def _saved_progress(job: RenderJob, sequence: FrameSequence, index: int) -> Progress | None:
     """Progress of an interrupted run of the same job, if there is any that fits."""
     saved = sequence.read_partial(index)
-    if saved is None or saved.keys() != {"total", "squares", "passes", "samples", "spp", "antialias"}:
+    if saved is None or saved.keys() != _SAVED:
         return None
     size = (job.height, job.width, 3)
     if (saved["total"].shape != size or saved["squares"].shape != size

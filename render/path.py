@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import drjit as dr
 
-from .sampler import Pcg
+from .sampler import Sampler
 from .variant import mi
 
 
@@ -28,7 +28,7 @@ class Radiance:
 
 
 @dr.syntax
-def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Pcg,
+def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
           max_depth: int) -> Radiance:
     """One path a lane.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import drjit as dr
 import numpy as np
@@ -15,7 +16,7 @@ from .frame import Frame
 from .gbuffer import GBUFFER, PrimaryHit
 from .path import trace
 from .rays import camera_matrices, pixel_rays
-from .sampler import FRAME_STREAM, REFERENCE_STREAM, Pcg, keys_from_seed
+from .sampler import FRAME_STREAM, REFERENCE_STREAM, Pcg, Sobol, keys_from_seed
 from .stage import Stage
 from .variant import mi
 
@@ -47,11 +48,11 @@ class Renderer:
         return Frame(index, images, matrices.camera_from_world, matrices.screen_from_world,
                      self.stage.world_from_object())
 
-    def sample_sum(self, index: int, seed: int, first: int, count: int,
+    def sample_sum(self, index: int, seed: int, number: int, count: int,
                    antialias: bool = False) -> np.ndarray:
-        """Sum of reference samples first ... first + count - 1 of every pixel of a frame.
+        """Sum of `count` samples of every pixel of a frame, independent between pass numbers.
 
-        Any split of a range of samples into calls draws the same samples.
+        The samples of one pass are stratified, and `count` is best a power of two.
 
         Args:
             antialias: samples spread over the pixel (box filter) instead of its centre.
@@ -60,7 +61,7 @@ class Renderer:
         """
         self.stage.pose(index)
         with dr.suspend_grad():
-            color = self._trace_samples(index, seed, first, count, antialias)
+            color = self._trace_samples(index, seed, number, count, antialias)
         dr.eval(color)
         return self._image(color)
 
@@ -73,7 +74,7 @@ class Renderer:
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
             planes = {}
             if set(channels) & set(RADIANCE):
-                sampler = Pcg(keys_from_seed(seed, FRAME_STREAM, index), pixel, mi.UInt32(0))
+                sampler = Pcg(keys_from_seed(seed, FRAME_STREAM, index), pixel)
                 radiance = trace(scene, ray, pi, sampler, self.scene.max_depth)
                 planes = {
                     "color": radiance.emission + radiance.direct + radiance.indirect,
@@ -87,19 +88,19 @@ class Renderer:
             return {name: planes[name] for name in channels}
 
     @dr.syntax
-    def _trace_samples(self, index: int, seed: int, first: int, count: int, antialias: bool):
+    def _trace_samples(self, index: int, seed: int, number: int, count: int, antialias: bool):
         scene = self.stage.mi_scene
         pixel = dr.arange(mi.UInt32, self.height * self.width)
         rays = pixel_rays(self.stage, self.height, self.width)
-        keys = keys_from_seed(seed, REFERENCE_STREAM, index)
+        keys = keys_from_seed(seed, REFERENCE_STREAM, index, number)
         x, y = self._centres(pixel)
         centre_ray, _ = rays.at(x, y)
         centre_pi = scene.ray_intersect_preliminary(centre_ray, coherent=True)
-        sample = dr.opaque(mi.UInt32, first)
-        end = dr.opaque(mi.UInt32, first + count)
+        sample = mi.UInt32(0)
+        end = dr.opaque(mi.UInt32, count)
         color = mi.Color3f(0)
         while dr.hint(sample < end, exclude=[scene, rays]):
-            sampler = Pcg(keys, pixel, sample)
+            sampler = Sobol(keys, pixel, sample)
             ray, pi = centre_ray, centre_pi
             if dr.hint(antialias, mode="scalar"):
                 jitter = sampler.next_2d()
@@ -117,6 +118,7 @@ class Renderer:
     def _image(self, value: object) -> np.ndarray:
         """(h, w) or (h, w, 3) NumPy copy of evaluated planes."""
         size = (self.height, self.width)
+        parts: Any = value if dr.depth_v(value) > 1 else [value]
         planes = [np.broadcast_to(plane.numpy(), self.height * self.width).reshape(size)
-                  for plane in (value if dr.depth_v(value) > 1 else [value])]
+                  for plane in parts]
         return np.stack(planes, -1) if len(planes) > 1 else planes[0].copy()

@@ -1,11 +1,16 @@
-"""Random numbers for a path, decided by (seed, stream, frame, pixel, sample) and nothing else.
+"""Random numbers for paths, decided by (seed, stream, frame, pixel, sample) and nothing else.
 
 Any pixel of any frame can be traced alone, in any order, by any number of threads, with the same
 numbers. `stream` keeps what must be independent apart: a frame and its reference never share a
 sample, even at the same seed.
+
+A sampler hands out dimensions in order with `next_1d` and `next_2d`. It is a Dr.Jit structure, so
+that it can live in a loop.
 """
 
 from __future__ import annotations
+
+from typing import ClassVar, Protocol
 
 import drjit as dr
 import numpy as np
@@ -14,32 +19,41 @@ from .variant import mi
 
 FRAME_STREAM, REFERENCE_STREAM = 0, 1
 
+Keys = tuple[mi.UInt32, mi.UInt32]
 
-def keys_from_seed(seed: int, stream: int, frame: int) -> tuple[mi.UInt32, mi.UInt32]:
+
+def keys_from_seed(*words: int) -> Keys:
     """Two 32-bit keys; opaque, so that another seed or frame is no new kernel.
 
     Source: NumPy's `SeedSequence`, which mixes the entropy of all its words.
     """
-    words = np.random.SeedSequence([seed, stream, frame]).generate_state(2)
-    return dr.opaque(mi.UInt32, int(words[0])), dr.opaque(mi.UInt32, int(words[1]))
+    a, b = np.random.SeedSequence(words).generate_state(2)
+    return dr.opaque(mi.UInt32, int(a)), dr.opaque(mi.UInt32, int(b))
+
+
+class Sampler(Protocol):
+    """The next numbers in [0, 1) of each lane."""
+
+    def next_1d(self) -> mi.Float: ...
+
+    def next_2d(self) -> mi.Point2f: ...
 
 
 class Pcg:
-    """Independent uniform numbers: a PCG32 stream for each (keys, pixel, sample).
+    """Independent uniform numbers: a PCG32 stream for each (keys, pixel).
 
     Source: O'Neill 2014 (PCG-XSH-RR); the stream is picked by the Tiny Encryption Algorithm
     (Zafar et al. 2010), as in Mitsuba's `independent` sampler.
     """
 
-    DRJIT_STRUCT = {"generator": mi.PCG32}
+    DRJIT_STRUCT: ClassVar[dict] = {"generator": mi.PCG32}
 
-    def __init__(self, keys: tuple[mi.UInt32, mi.UInt32] | None = None,
-                 pixel: mi.UInt32 | None = None, sample: mi.UInt32 | None = None) -> None:
+    def __init__(self, keys: Keys | None = None, pixel: mi.UInt32 | None = None) -> None:
         if keys is None:  # Dr.Jit builds empty loop states this way
             self.generator = mi.PCG32()
             return
         a, b = mi.sample_tea_32(pixel, keys[0])
-        state, sequence = mi.sample_tea_32(a ^ sample, b ^ keys[1])
+        state, sequence = mi.sample_tea_32(a, b ^ keys[1])
         self.generator = mi.PCG32(1, mi.UInt64(state), mi.UInt64(sequence))
 
     def next_1d(self) -> mi.Float:
@@ -47,3 +61,69 @@ class Pcg:
 
     def next_2d(self) -> mi.Point2f:
         return mi.Point2f(self.generator.next_float32(), self.generator.next_float32())
+
+
+class Sobol:
+    """Numbers that stratify the samples of one pixel: padded 2D Sobol points, Owen-scrambled.
+
+    Each pair of dimensions is the (0, 2)-sequence in an order and a scrambling of its own.
+
+    Source: Burley 2020, "Practical Hash-based Owen Scrambling"; the hash is Vegdahl's improvement
+    of Laine and Karras; the second Sobol dimension by Ahmed 2024's bit-parallel product.
+    """
+
+    DRJIT_STRUCT: ClassVar[dict] = {"index": mi.UInt32, "seed": mi.UInt32, "dimension": mi.UInt32}
+
+    def __init__(self, keys: Keys | None = None, pixel: mi.UInt32 | None = None,
+                 index: mi.UInt32 | None = None) -> None:
+        """`index` is the sample's number, from 0; `keys` and `pixel` pick the scrambling."""
+        self.index, self.seed, self.dimension = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
+        if keys is not None:
+            a, b = mi.sample_tea_32(pixel, keys[0])
+            self.seed = a ^ b ^ keys[1]
+            self.index = mi.UInt32(index)
+
+    def next_1d(self) -> mi.Float:
+        order, scramble, _ = self._next_seeds()
+        return _unit(_owen(dr.brev(_shuffle(self.index, order)), scramble))
+
+    def next_2d(self) -> mi.Point2f:
+        order, scramble_x, scramble_y = self._next_seeds()
+        x = dr.brev(_shuffle(self.index, order))
+        y = mi.UInt32(x)
+        y ^= y << 16
+        y ^= (y & 0x00FF00FF) << 8
+        y ^= (y & 0x0F0F0F0F) << 4
+        y ^= (y & 0x33333333) << 2
+        y ^= (y & 0x55555555) << 1
+        return mi.Point2f(_unit(_owen(x, scramble_x)), _unit(_owen(y, scramble_y)))
+
+    def _next_seeds(self) -> tuple[mi.UInt32, mi.UInt32, mi.UInt32]:
+        a, b = mi.sample_tea_32(self.seed, self.dimension)
+        self.dimension += 1
+        return a, b, a ^ dr.brev(b)
+
+
+def _owen(bits: mi.UInt32, seed: mi.UInt32) -> mi.UInt32:
+    """Owen scrambling of a fraction: each bit is flipped by a hash of those above it."""
+    return dr.brev(_hash_upward(dr.brev(bits), seed))
+
+
+def _shuffle(index: mi.UInt32, seed: mi.UInt32) -> mi.UInt32:
+    """A permutation that keeps every aligned power-of-two block of indices together."""
+    return _owen(index, seed)
+
+
+def _hash_upward(x: mi.UInt32, seed: mi.UInt32) -> mi.UInt32:
+    """A permutation in which a bit is changed by lower bits only."""
+    x ^= x * 0x3D20ADEA
+    x += seed
+    x *= (seed >> 16) | 1
+    x ^= x * 0x05526C56
+    x ^= x * 0x53A22864
+    return x
+
+
+def _unit(bits: mi.UInt32) -> mi.Float:
+    """[0, 1) from the highest 24 bits."""
+    return mi.Float(bits >> 8) * 2.0**-24

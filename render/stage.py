@@ -9,7 +9,8 @@ Traps that this file exists for:
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, cast
 
 import drjit as dr
 import numpy as np
@@ -35,7 +36,8 @@ class Stage:
         self.description = description
         self.origin = description.camera.world_from_camera_at(0)[:3, 3].copy()
         self.frame = frame
-        self._mirrored = {s.name: _mirrors(s.world_from_object_at(frame)) for s in description.shapes}
+        self._mirrored = {shape.name: _mirrors(shape.world_from_object_at(frame))
+                          for shape in description.shapes}
         scene: dict[str, Any] = {"type": "scene"}
         for shape in description.shapes:
             scene[shape.name] = self._load_shape(shape, frame)
@@ -65,12 +67,13 @@ class Stage:
     def sensor(self, height: int, width: int) -> mi.Sensor:
         """Mitsuba's own pinhole camera at the same place, for comparisons with its integrators."""
         camera = self.description.camera
-        world_from_camera = self._local(camera.world_from_camera_at(self.frame))
         # Mitsuba's camera has x to the left and y up.
+        world_from_sensor = self._local(camera.world_from_camera_at(self.frame)) @ np.diag(
+            [-1.0, -1.0, 1.0, 1.0])
         return mi.load_dict({
             "type": "perspective", "fov": camera.fov, "fov_axis": "y",
             "near_clip": 1e-4, "far_clip": 1e6,
-            "to_world": mi.ScalarTransform4f((world_from_camera @ np.diag([-1., -1, 1, 1])).tolist()),
+            "to_world": mi.ScalarTransform4f(world_from_sensor.tolist()),
             "film": {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",
                      "rfilter": {"type": "box"}},
         })
@@ -102,7 +105,7 @@ class Stage:
                        geometry.normals is not None, geometry.uv is not None)
         parameters = mi.traverse(mesh)
         if geometry.uv is not None:
-            parameters["vertex_texcoords"] = mi.Float(geometry.uv.astype(np.float32).ravel())
+            parameters["vertex_texcoords"] = _buffer(geometry.uv)
         for key, value in _placed(geometry, local).items():
             parameters[key] = value
         parameters.update()
@@ -124,13 +127,15 @@ class Stage:
             self._parameters[f"{shape.name}.to_world"] = to_world
 
     def _registry_table(self) -> mi.UInt32:
-        registry_index = {}
-        for shape in self.mi_scene.shapes():
-            registry_index[shape.id()] = dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]
+        registry_index = {s.id(): _registry_index(s) for s in self.mi_scene.shapes()}
         table = np.zeros(max(registry_index.values()) + 1, np.uint32)
         for object_id, name in enumerate(self.description.object_names):
             table[registry_index[name]] = object_id
         return mi.UInt32(table)
+
+
+def _registry_index(shape: Any) -> int:
+    return int(cast(Any, dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape)))[0])
 
 
 def _mirrors(matrix: np.ndarray) -> bool:
@@ -152,15 +157,19 @@ def _placed(mesh: Mesh, matrix: np.ndarray) -> dict[str, Any]:
     linear = matrix[:3, :3]
     faces = mesh.faces[:, ::-1] if _mirrors(matrix) else mesh.faces
     placed: dict[str, Any] = {
-        "vertex_positions": mi.Float((mesh.vertices @ linear.T + matrix[:3, 3]).astype(np.float32).ravel()),
+        "vertex_positions": _buffer(mesh.vertices @ linear.T + matrix[:3, 3]),
         "faces": mi.UInt32(np.ascontiguousarray(faces).ravel()),
     }
     if mesh.normals is not None:
         cofactors = np.linalg.inv(linear).T
         normals = mesh.normals @ cofactors.T
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        placed["vertex_normals"] = mi.Float(normals.astype(np.float32).ravel())
+        placed["vertex_normals"] = _buffer(normals)
     return placed
+
+
+def _buffer(array: np.ndarray) -> mi.Float:
+    return mi.Float(array.astype(np.float32).ravel())
 
 
 def _rgb(color: tuple[float, float, float]) -> dict[str, Any]:
@@ -173,7 +182,7 @@ def _plugin(value: Any) -> Any:
         return _rgb(value)
     if isinstance(value, np.ndarray):
         return _plugin({"type": "bitmap", "bitmap": value, "raw": True})
-    if not hasattr(value, "items"):
+    if not isinstance(value, Mapping):
         return value
     plugin = {key: mi.Bitmap(np.asarray(part, np.float32)) if key == "bitmap" else _plugin(part)
               for key, part in value.items()}

@@ -33,6 +33,7 @@ class Steps:
         self.title, self.total, self._bar = title, total, bar
         self._started: float | None = None
         self._shown = time.monotonic()
+        self._finished = False
         self._task = bar.add_task(title, total=total, start=False) if bar else None
 
     def advance(self, done: float, note: str = "") -> None:
@@ -43,12 +44,14 @@ class Steps:
             self._bar.update(self._task, completed=done, description=f"{self.title} {note}".strip())
         now = time.monotonic()
         self._started = self._started or now
-        last = done >= self.total
+        last = done >= self.total and not self._finished
+        self._finished = done >= self.total
         if self._bar is None and (last or now - self._shown >= SECONDS_BETWEEN_LINES):
             self._shown = now
             left = (now - self._started) * (self.total - done) / done if done else 0
             ending = "" if last or not left else f", {left:.0f} s left"
-            click.echo(f"{self.title}: {done:.4g} of {self.total:g} {note}".rstrip() + ending, err=True)
+            text = f"{self.title}: {done:.4g} of {self.total:g} {note}".rstrip()
+            click.echo(text + ending, err=True)
 
 
 @contextmanager
@@ -66,7 +69,8 @@ def progress() -> Iterator[Callable[[str, float], Steps]]:
         yield lambda title, total: Steps(title, total, bar)
 
 
-def run(command: click.Command, arguments: Sequence[str] | None = None, name: str = "onespp") -> None:
+def run(command: click.Command, arguments: Sequence[str] | None = None,
+        name: str = "onespp") -> None:
     """Run a command line and exit: 0 done, 2 bad input, 130 interrupted.
 
     SIGTERM stops a job as Ctrl-C does, so that what was finished is kept. Errors that are not
@@ -84,8 +88,8 @@ def run(command: click.Command, arguments: Sequence[str] | None = None, name: st
     except (InputError, SceneError) as error:
         _stop(str(error))
     except (click.Abort, KeyboardInterrupt):
-        click.echo(f"{name}: stopped; what was finished is kept, the same command goes on from there",
-                   err=True)
+        click.echo("onespp: stopped; what was finished is kept, and the same command goes on "
+                   "from there", err=True)
         sys.exit(INTERRUPTED)
     except BrokenPipeError:
         sys.stderr.close()  # the reader of our output has gone, as in `onespp ... | head`
@@ -99,8 +103,8 @@ def run(command: click.Command, arguments: Sequence[str] | None = None, name: st
 
 _REASONS = {
     errno.ENOSPC: "the disk is full{where}: free some space, then run the same command again",
-    errno.EDQUOT: "the disk quota is used up{where}: free some space, then run the same command again",
-    errno.EACCES: "permission denied{where}: choose another --out, or change the folder's permissions",
+    errno.EDQUOT: "the disk quota is used up{where}: free space, then run the same command again",
+    errno.EACCES: "permission denied{where}: choose another --out, or change its permissions",
     errno.EPERM: "operation not permitted{where}: choose another --out",
     errno.EROFS: "the file system is read-only{where}: choose another --out",
     errno.ENOTDIR: "a file is in the way of a folder{where}: choose another --out",

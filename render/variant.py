@@ -6,12 +6,16 @@ program set itself is kept if it will do.
 
 from __future__ import annotations
 
-import mitsuba as mi
+from typing import Any
+
+import mitsuba
 
 from . import backend
 from .errors import InputError
 
 VARIANTS = {"llvm": "llvm_ad_rgb", "cuda": "cuda_ad_rgb"}
+
+mi: Any = mitsuba  # its stubs describe no variant in particular
 
 if mi.variant() is None:
     mi.set_variant(VARIANTS[backend.choose()])

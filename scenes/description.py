@@ -71,13 +71,14 @@ class Mesh:
             if array is not None:
                 array = np.asarray(array, np.float64)
                 if array.shape != (n, columns):
-                    raise SceneError(f"mesh {name} have shape {array.shape}, expected ({n}, {columns})")
+                    raise SceneError(f"mesh {name} have shape {array.shape}, "
+                                     f"expected ({n}, {columns})")
                 object.__setattr__(self, name, array)
         faces = np.asarray(self.faces)
         if faces.ndim != 2 or faces.shape[1] != 3 or not np.issubdtype(faces.dtype, np.integer):
             raise SceneError(f"mesh faces have shape {faces.shape} and type {faces.dtype}, "
                              "expected (m, 3) integers")
-        if faces.size and not (0 <= faces.min() and faces.max() < n):
+        if faces.size and not (faces.min() >= 0 and faces.max() < n):
             raise SceneError(f"mesh faces use vertex {faces.max()}, but there are {n} vertices")
         object.__setattr__(self, "faces", faces.astype(np.uint32))
 
@@ -187,7 +188,8 @@ class Scene:
             raise SceneError(f"scene '{self.name}' has no shapes")
         for name in ("frames", "width", "height", "max_depth", "fps"):
             if getattr(self, name) < 1:
-                raise SceneError(f"scene '{self.name}' has {name} = {getattr(self, name)}: use 1 or more")
+                raise SceneError(f"scene '{self.name}' has {name} = {getattr(self, name)}: "
+                                 "use 1 or more")
         if self.environment is None and not any(shape.emission for shape in self.shapes):
             raise SceneError(f"scene '{self.name}' has no light: give a shape an emission, "
                              "or the scene an environment")

@@ -30,7 +30,8 @@ def _feed(digest: Any, value: Any, times: range) -> None:
     if callable(value):
         value = [value(time) for time in times]
     if isinstance(value, np.ndarray):
-        digest.update(f"{value.dtype}{value.shape}".encode() + np.ascontiguousarray(value).tobytes())
+        digest.update(f"{value.dtype}{value.shape}".encode())
+        digest.update(np.ascontiguousarray(value).tobytes())
     elif is_dataclass(value):
         for field in fields(value):
             _feed(digest, getattr(value, field.name), times)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 Matrix = np.ndarray
-Vector = Sequence[float]
+Vector = Sequence[float] | np.ndarray
 
 
 def identity() -> Matrix:
@@ -51,8 +51,7 @@ def look_at(origin: Vector, target: Vector, up: Vector = (0, 1, 0)) -> Matrix:
     Raises:
         ValueError: origin and target coincide, or `up` is parallel to the view.
     """
-    origin, target = np.asarray(origin, float), np.asarray(target, float)
-    forward = target - origin
+    forward = np.asarray(target, float) - np.asarray(origin, float)
     right = np.cross(forward, np.asarray(up, float))
     if not np.linalg.norm(right) > 1e-12 * np.linalg.norm(forward) * np.linalg.norm(up):
         raise ValueError(f"look_at({origin}, {target}, {up}): the view direction is zero "

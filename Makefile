@@ -1,0 +1,36 @@
+# Everything in two commands: `make demo` and `make test`. Without make: see README.md.
+PYTHON ?= python3
+BIN := .venv/bin
+ifeq ($(OS),Windows_NT)
+BIN := .venv/Scripts
+endif
+
+.PHONY: demo test lint slow clean
+
+demo: .venv/installed
+	$(BIN)/onespp run box --frames 0:8 --size 192x192 --reference-spp 256 --out data/demo \
+	    --method bilateral --method atrous --method assignment --method assignment-atrous
+	@echo "Look at data/demo/pictures."
+
+test: .venv/installed-dev lint
+	$(BIN)/python -m pytest
+
+lint: .venv/installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/pyright
+
+slow: .venv/installed-dev
+	$(BIN)/python -m pytest -m slow
+
+.venv/installed: pyproject.toml
+	test -d .venv || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --editable .
+	touch $@
+
+.venv/installed-dev: pyproject.toml
+	test -d .venv || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	touch $@ .venv/installed
+
+clean:
+	rm -rf .venv data build *.egg-info

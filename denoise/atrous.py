@@ -1,0 +1,211 @@
+"""Edge-avoiding a-trous wavelet filter with SVGF's variance-guided weights.
+
+Symbols: p the pixel, q a tap; i the level; h the 5x5 B3 spline {1/16, 1/4, 3/8, 1/4, 1/16}^2;
+l luminance, v its variance; n normal, z depth; k = n . X distance of the camera from p's plane.
+
+Level i filters what level i - 1 gave, with taps 2^i pixels apart:
+
+    C'(p) = sum h w C(q) / sum h w,    v'(p) = sum (h w)^2 v(q) / (sum h w)^2,
+    w = exp(-|l(p) - l(q)| / (sigma_luminance sqrt(g3x3(v)(p)) + eps))
+        (n(p) . n(q))^normal_power exp(-distance(q, p's plane) / (sigma_plane z(p)))
+
+with g3x3 the binomial {1, 2, 1}^2 / 16. The first variance is that of l over a 7x7 window's pixels
+on p's plane, since one frame has no history. Colour is filtered without texture (demodulation.py)
+where the frame has albedo.
+
+Sources: Dammertz et al. 2010; Schied et al. 2017 (SVGF), sigma_luminance 4, normal_power 128.
+
+Departures from SVGF:
+- Its depth term uses the depth's screen-space gradient by finite differences. Over a plane 1/z is
+  linear on the screen, with a slope that follows from n; so the distance from the tangent plane
+  is |k| |1/z(q) - the plane's 1/z there| z(q), with z(p) for z(q). No differences, no positions.
+- x^128 = exp(-128 (t + t^2 / 2)), t = 1 - x: within 1e-3 of the largest weight.
+- Two pixels without a surface have full geometry weights; one with, one without: 0.
+- Only pixels inside the image count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import drjit as dr
+import numpy as np
+
+from render.errors import InputError
+from render.frame import Frame
+
+from .demodulation import read_texture
+from .parameters import check_positive
+from .stencil import Float, Stencil, Step, Taps, exp2
+from .surface import GUIDES, Surface, luminance, read_color, read_surface
+
+LOG2E = 1.4426950408889634
+SPLINE = {0: 3 / 8, 1: 1 / 4, 2: 1 / 16}
+BINOMIAL = {0: 1 / 2, 1: 1 / 4}
+VARIANCE_RADIUS = 3
+LARGEST_LEVELS = 8
+EPSILON = 1e-6       # radiance; below it differences of luminance do not count
+BACKGROUND = -1e8    # 1/z where there is no surface: far from any plane, so that its weight is 0
+_OUTSIDE = -1e15     # 1/z outside the image
+_BACKGROUND_SCALE = 1e3  # plays |k| / sigma_plane for background, whose neighbours must be background
+
+
+def _window(radius: int) -> list[tuple[int, int]]:
+    side = range(-radius, radius + 1)
+    return [(dy, dx) for dy in side for dx in side if (dy, dx) != (0, 0)]
+
+
+@dataclass(frozen=True)
+class Atrous:
+    """A-trous filter of each frame by itself.
+
+    Attributes:
+        levels: 1 to 8; the last one's taps lie 2^(levels - 1) pixels apart.
+        sigma_luminance: in deviations. sigma_plane: distance from the tangent plane over depth.
+        normal_power: exponent of the cosine between normals.
+        demodulate: filter colour over albedo, where the frame has albedo.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("color", *GUIDES)
+
+    levels: int = 5
+    sigma_luminance: float = 4.0
+    sigma_plane: float = 0.01
+    normal_power: float = 128.0
+    demodulate: bool = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.levels, int) or not 1 <= self.levels <= LARGEST_LEVELS:
+            raise InputError(f"levels is {self.levels}: use a whole number from 1 to {LARGEST_LEVELS}")
+        check_positive(self, "sigma_luminance", "sigma_plane", "normal_power")
+
+    @property
+    def reach(self) -> int:
+        return max(2 << (self.levels - 1), VARIANCE_RADIUS)
+
+    def init(self, height: int, width: int) -> AtrousState:
+        return self.init_on(Stencil(height, width, self.reach))
+
+    def __call__(self, frame: Frame, state: AtrousState) -> tuple[np.ndarray, AtrousState]:
+        """(h, w, 3) filtered colour of a frame.
+
+        Raises:
+            InputError: a channel is missing, or the size is not the state's.
+        """
+        color, surface = read_color(frame, state.stencil), read_surface(frame, state.stencil)
+        return state.stencil.image(self.filter(frame, color, surface, state)), state
+
+    def init_on(self, stencil: Stencil) -> AtrousState:
+        """State on a stencil that reaches at least `reach` pixels."""
+        signal, guides = stencil.planes([0.0] * 4), stencil.planes([0.0] * 3 + [_OUTSIDE])
+        level_taps = []
+        for i in range(self.levels):
+            offsets = [(dy << i, dx << i) for dy, dx in _window(2)]
+            level_taps.append((signal.taps(offsets), guides.taps(offsets)))
+        return AtrousState(
+            stencil, signal, guides, level_taps, signal.taps(_window(1)),
+            (signal.taps(_window(VARIANCE_RADIUS)), guides.taps(_window(VARIANCE_RADIUS))),
+            [stencil.opaque(1 << i) for i in range(self.levels)],
+            Step(estimate_variance), [Step(luminance_scale) for _ in range(self.levels)],
+            [Step(filter_level) for _ in range(self.levels)])
+
+    def filter(self, frame: Frame, color: list[Float], surface: Surface,
+               state: AtrousState) -> list[Float]:
+        """Filtered colour of a frame, as arrays of lanes."""
+        stencil = state.stencil
+        texture = read_texture(frame, stencil, self.demodulate)
+        light = texture.remove(color)
+        float_t = stencil.Float
+        normal = [dr.select(surface.exists, n, m) for n, m in zip(surface.normal, (1, 0, 0))]
+        inverse_depth = dr.select(surface.exists, surface.inverse_depth, float_t(BACKGROUND))
+        scale = dr.select(surface.exists, dr.abs(surface.plane_distance)
+                          * stencil.opaque(1 / self.sigma_plane), float_t(_BACKGROUND_SCALE))
+        guides = [*normal, inverse_depth, *surface.plane, scale]
+        l = luminance(light)
+        dr.eval(light, guides, l)
+        state.guides.store(guides[:4])
+        state.signal.store([*light, l])  # the variance's place holds l until there is a variance
+        variance = state.variance_step(*state.variance_taps, [l], guides)
+        numbers = [stencil.opaque(EPSILON), stencil.opaque(self.sigma_luminance / LOG2E),
+                   stencil.opaque(LOG2E * self.normal_power)]
+        signal = [*light, variance]
+        for i in range(self.levels):
+            state.signal.store(signal)
+            scale_of_l = state.scale_steps[i](state.blur_taps, signal[3:], numbers)
+            signal = state.level_steps[i](*state.level_taps[i], signal, guides,
+                                          [scale_of_l], [state.spacings[i], numbers[2]])
+        return texture.restore(signal[:3])
+
+
+@dataclass(frozen=True)
+class AtrousState:
+    """Planes of the signal (colour 3, variance) and of the guides (n, 1/z), and their taps."""
+
+    stencil: Stencil
+    signal: Any
+    guides: Any
+    level_taps: list[tuple[Taps, Taps]]
+    blur_taps: Taps
+    variance_taps: tuple[Taps, Taps]
+    spacings: list[Float]
+    variance_step: Step
+    scale_steps: list[Step]
+    level_steps: list[Step]
+
+
+def estimate_variance(signal: Taps, guides: Taps, center: list[Float],
+                      center_guides: list[Float]) -> Float:
+    """Variance of the luminance over the taps within sigma_plane of the pixel's plane.
+
+    Sums run over differences from the pixel itself, which keeps digits on bright pixels.
+    """
+    (l,), (_, _, _, inverse_depth, gx, gy, scale) = center, center_guides
+    float_t = type(l)
+    count, sum1, sum2 = float_t(1), float_t(0), float_t(0)
+    for i, (dy, dx) in enumerate(_window(VARIANCE_RADIUS)):
+        expected = dr.fma(gx, float(dx), dr.fma(gy, float(dy), inverse_depth))
+        on_plane = dr.abs(guides.at(i)[3] - expected) * scale < 1
+        d = dr.select(on_plane, signal.at(i)[3] - l, 0)
+        count += dr.select(on_plane, float_t(1), 0)
+        sum1, sum2 = sum1 + d, dr.fma(d, d, sum2)
+        signal.next()
+    mean = sum1 / count
+    variance = dr.fma(-mean, mean, sum2 / count)
+    return dr.select(variance > 0, variance, 0)
+
+
+def luminance_scale(taps: Taps, variance: list[Float], numbers: list[Float]) -> Float:
+    """log2(e) / (sigma_luminance sqrt(g3x3(v)) + eps)."""
+    epsilon, sigma, _ = numbers
+    blurred = variance[0] * BINOMIAL[0]**2
+    for i, (dy, dx) in enumerate(_window(1)):
+        blurred = dr.fma(taps.at(i)[3], BINOMIAL[abs(dy)] * BINOMIAL[abs(dx)], blurred)
+    return 1 / dr.fma(sigma, dr.sqrt(blurred), epsilon)
+
+
+def filter_level(signal: Taps, guides: Taps, center: list[Float], center_guides: list[Float],
+                 scale_of_l: list[Float], numbers: list[Float]) -> list[Float]:
+    """One level: filtered colour (3) and variance. numbers: spacing, log2(e) normal_power."""
+    nx, ny, nz, inverse_depth, gx, gy, scale = center_guides
+    spacing, power = numbers
+    half_power = power * 0.5
+    gx, gy = gx * spacing, gy * spacing
+    l, l_scale = luminance(center[:3]), scale_of_l[0]
+    h0 = SPLINE[0]**2
+    total = type(l)(h0)
+    r, g, b, v = [c * h0 for c in center[:3]] + [center[3] * h0**2]
+    for i, (dy, dx) in enumerate(_window(2)):
+        tr, tg, tb, tv = signal.at(i)
+        tnx, tny, tnz, tap_inverse_depth = guides.at(i)
+        t = dr.fma(-nx, tnx, dr.fma(-ny, tny, dr.fma(-nz, tnz, 1)))
+        expected = dr.fma(gx, float(dx), dr.fma(gy, float(dy), inverse_depth))
+        e = dr.fma(-t, dr.fma(t, half_power, power), np.log2(SPLINE[abs(dy)] * SPLINE[abs(dx)]).item())
+        e = dr.fma(dr.abs(tap_inverse_depth - expected), -scale, e)
+        e = dr.fma(dr.abs(luminance([tr, tg, tb]) - l), -l_scale, e)
+        w = exp2(e)
+        r, g, b, total = dr.fma(w, tr, r), dr.fma(w, tg, g), dr.fma(w, tb, b), total + w
+        v = dr.fma(w * w, tv, v)
+        signal.next()
+    norm = 1 / total
+    return [r * norm, g * norm, b * norm, v * norm * norm]

@@ -1,0 +1,51 @@
+"""Texture taken out of the colour before filtering, and put back after.
+
+L = (C - E) / max(a, 0.001), with C colour, E emission, a albedo (SVGF, Schied et al. 2017). What
+is left is light alone, smooth where a texture is not, and a filter cannot blur the texture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import numpy as np
+
+from render.frame import Frame
+
+from .stencil import Float, Stencil
+
+CHANNELS = ("albedo", "emission")  # used where a frame has them
+SMALLEST_ALBEDO = 1e-3
+
+
+@dataclass(frozen=True)
+class Texture:
+    """What was taken out, as arrays of lanes; empty lists: nothing."""
+
+    albedo: list[Float]
+    emission: list[Float]
+
+    def remove(self, color: list[Float]) -> list[Float]:
+        light = [c - e for c, e in zip(color, self.emission)] if self.emission else color
+        return [c / a for c, a in zip(light, self.albedo)] if self.albedo else light
+
+    def restore(self, light: list[Float]) -> list[Float]:
+        color = [c * a for c, a in zip(light, self.albedo)] if self.albedo else light
+        return [c + e for c, e in zip(color, self.emission)] if self.emission else color
+
+
+def read_texture(frame: Frame, stencil: Stencil, wanted: bool) -> Texture:
+    """Albedo and emission of a frame, where it has them; nothing if it has no albedo.
+
+    Values that are not finite count as albedo 1 and emission 0.
+    """
+    if not wanted or "albedo" not in frame:
+        return Texture([], [])
+    albedo = stencil.load(np.asarray(frame["albedo"], np.float32))
+    albedo = [dr.select(dr.abs(a) < 1e6, a, 1) for a in albedo]
+    albedo = [dr.select(a > SMALLEST_ALBEDO, a, SMALLEST_ALBEDO) for a in albedo]
+    if "emission" not in frame:
+        return Texture(albedo, [])
+    emission = stencil.load(np.asarray(frame["emission"], np.float32))
+    return Texture(albedo, [dr.select(dr.abs(e) < 1e18, e, 0) for e in emission])

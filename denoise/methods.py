@@ -1,0 +1,106 @@
+"""The denoising methods by name, and how to build one from text.
+
+A method is a frozen dataclass of parameters, checked when built. It is called with one frame
+after another and its own state, which holds all that is remembered and all memory it works in:
+
+    method = METHODS["assignment"]()
+    state = method.init(height, width)
+    for frame in frames:
+        image, state = method(frame, state)     # (h, w, 3) float32, linear radiance
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
+from types import MappingProxyType
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from render.errors import InputError
+from render.frame import Frame
+
+from .assignment import Assignment, AssignmentAtrous
+from .atrous import Atrous
+from .bilateral import Bilateral
+from .temporal import Temporal
+
+
+class Method(Protocol):
+    """What every denoiser offers.
+
+    Attributes:
+        needs: channels that a frame must have.
+    """
+
+    needs: ClassVar[tuple[str, ...]]
+
+    def init(self, height: int, width: int) -> Any:
+        """State before the first frame of a sequence of this size."""
+        ...
+
+    def __call__(self, frame: Frame, state: Any) -> tuple[np.ndarray, Any]:
+        """(h, w, 3) float32 denoised radiance, and the state for the next frame."""
+        ...
+
+
+METHODS: Mapping[str, type] = MappingProxyType({
+    "bilateral": Bilateral,
+    "atrous": Atrous,
+    "temporal": Temporal,
+    "assignment": Assignment,
+    "assignment-atrous": AssignmentAtrous,
+})
+
+
+def build(name: str, settings: Mapping[str, str] | None = None) -> Method:
+    """A method by name, with some parameters given as text: `build("bilateral", {"radius": "8"})`.
+
+    Raises:
+        InputError: no such method or parameter (the message lists them), or a value that does
+            not read as the parameter's type or is out of its range.
+    """
+    if name not in METHODS:
+        raise InputError(f"unknown method '{name}': use {', '.join(METHODS)}")
+    method = METHODS[name]()
+    known = parameters(method)
+    typed = {}
+    for key, text in (settings or {}).items():
+        if key not in known:
+            raise InputError(f"method '{name}' has no parameter '{key}': "
+                             f"it has {', '.join(known)}")
+        typed[key] = _parse(key, text, type(known[key]))
+    return _replace(method, typed)
+
+
+def parameters(method: Any) -> dict[str, bool | int | float]:
+    """Parameter name -> value, those of a method's parts included."""
+    found: dict[str, bool | int | float] = {}
+    for f in fields(method):
+        value = getattr(method, f.name)
+        found.update(parameters(value) if is_dataclass(value) else {f.name: value})
+    return found
+
+
+def _replace(method: Any, values: Mapping[str, Any]) -> Any:
+    changes = {}
+    for f in fields(method):
+        value = getattr(method, f.name)
+        if is_dataclass(value):
+            changes[f.name] = _replace(value, values)
+        elif f.name in values:
+            changes[f.name] = values[f.name]
+    return replace(method, **changes)
+
+
+_WORDS = {"true": True, "yes": True, "on": True, "1": True,
+          "false": False, "no": False, "off": False, "0": False}
+
+
+def _parse(key: str, text: str, kind: type) -> bool | int | float:
+    try:
+        return _WORDS[text.strip().lower()] if kind is bool else kind(text)
+    except (KeyError, ValueError):
+        expected = {bool: "true or false", int: "a whole number", float: "a number"}[kind]
+        raise InputError(f"{key} is '{text}': use {expected}") from None

@@ -1,0 +1,30 @@
+"""Checks of denoiser parameters, and parameters given as text."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from render.errors import InputError
+
+
+def check_positive(denoiser: Any, *names: str) -> None:
+    """InputError unless the fields are finite and above 0."""
+    for name in names:
+        value = getattr(denoiser, name)
+        if not (math.isfinite(value) and value > 0):
+            raise InputError(f"{name} is {value}: use a number above 0")
+
+
+def check_range(denoiser: Any, name: str, low: float, high: float) -> None:
+    """InputError unless low <= field <= high."""
+    value = getattr(denoiser, name)
+    if not low <= value <= high:
+        raise InputError(f"{name} is {value}: use {low:g} to {high:g}")
+
+
+def check_radius(denoiser: Any, name: str, largest: int = 64) -> None:
+    """InputError unless the field is a whole number of pixels from 1 to `largest`."""
+    value = getattr(denoiser, name)
+    if not isinstance(value, int) or not 1 <= value <= largest:
+        raise InputError(f"{name} is {value}: use a whole number from 1 to {largest}")

@@ -1,0 +1,194 @@
+"""Where each pixel's surface was in the previous frame, and what was seen there.
+
+Symbols: ' the previous frame; u = (x + 1/2, y + 1/2, 1) a pixel's centre; z camera-space depth;
+X position and n normal in camera space; S screen_from_camera, B = S^-1 (both 3x3, rows x, y,
+depth); M world_from_object.
+
+The assignment's P' V' M'_id M_id^-1 X, in three steps that keep the digits:
+
+1. Per object, in float64: T = V' M'_id M_id^-1 V^-1, previous_camera_from_camera (A its 3x3
+   part, t its translation). Coordinates of 1e6 units cancel here, before float32.
+2. S' T X - S X = z (E u + S' t / z), with E = S' A B - I. It is exactly 0 for what does not move.
+3. Per pixel, in float32, the motion d = E u + S' t / z, and
+       x' - x = (d_x - u_x d_w) / (1 + d_w),  z' = z (1 + d_w).
+
+A pixel of the previous frame (a tap) counts if its object is the same, its normal is near the
+expected n' = R n (R the rotation of T), and it lies near the expected tangent plane:
+|n' . (X'_tap - X')| < plane_tolerance z'. Bilinear reprojection weighs the taps that pass and
+renormalises; with less than `LEAST_WEIGHT` there is no history.
+
+Departure from the assignment: it takes the one nearest pixel and tests the object alone;
+`nearest=True` does the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from render.errors import InputError
+from render.frame import Frame
+
+from .stencil import Float, Stencil
+from .surface import Surface, camera_from_screen, dot, transform
+
+LEAST_WEIGHT = 0.01
+WORDS = 8            # a pixel of packed history: colour 3, object ID, normal 3, depth
+_ROW = 32            # floats an object in the motion table: E and S' t (3x4), R (3x3, rows of 4)
+_FEWEST_OBJECTS = 64
+
+
+@dataclass(frozen=True)
+class Tests:
+    """What a pixel of the previous frame must pass.
+
+    Attributes:
+        nearest: one tap, tested by object alone. min_cosine: of the angle between normals.
+        plane_tolerance: distance from the tangent plane over depth.
+    """
+
+    nearest: bool
+    min_cosine: float
+    plane_tolerance: float
+
+
+def motion_table(previous: Frame, current: Frame) -> np.ndarray:
+    """(objects, 32) float32: E | S' t and R of each object; see the module's header.
+
+    An object whose matrix is singular, or that only one of the frames has, gets NaN: no history.
+    """
+    count = len(current.world_from_object)
+    table = np.full((count, _ROW), np.nan)
+    b = camera_from_screen(current)
+    s_previous = np.linalg.inv(camera_from_screen(previous))
+    world_from_camera = np.linalg.inv(current.camera_from_world)
+    for i in range(min(count, len(previous.world_from_object))):
+        motion = _world_motion(previous.world_from_object[i], current.world_from_object[i])
+        if motion is None:
+            continue
+        t = previous.camera_from_world @ motion @ world_from_camera
+        moved = not np.array_equal(motion, np.eye(4)) or not _same_view(previous, current)
+        e = s_previous @ t[:3, :3] @ b - np.eye(3) if moved else np.zeros((3, 3))
+        shift = s_previous @ t[:3, 3] if moved else np.zeros(3)
+        table[i, :12] = np.column_stack([e, shift]).ravel()
+        table[i, 12:24] = np.column_stack([_rotation(t[:3, :3]), np.zeros(3)]).ravel()
+        table[i, 24:] = 0
+    return table.astype(np.float32)
+
+
+def _world_motion(previous: np.ndarray, current: np.ndarray) -> np.ndarray | None:
+    """M' M^-1, exactly the identity for an object at rest; None if M cannot be inverted."""
+    if np.array_equal(previous, current):
+        return np.eye(4)
+    try:
+        return previous @ np.linalg.inv(current)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def _same_view(previous: Frame, current: Frame) -> bool:
+    return (np.array_equal(previous.camera_from_world, current.camera_from_world)
+            and np.array_equal(previous.screen_from_world, current.screen_from_world))
+
+
+def _rotation(a: np.ndarray) -> np.ndarray:
+    """What normals turn by: the inverse transpose, its scale taken out."""
+    try:
+        normal_from_normal = np.linalg.inv(a).T
+    except np.linalg.LinAlgError:
+        return np.full((3, 3), np.nan)
+    return normal_from_normal * np.cbrt(np.abs(np.linalg.det(a)))
+
+
+def load_table(table: np.ndarray, stencil: Stencil) -> Float:
+    """The table on the device, with room for 64 objects, 128, 256, ... (one recording each)."""
+    room = max(_FEWEST_OBJECTS, 1 << len(table).bit_length())
+    padded = np.full((room, _ROW), np.nan, np.float32)
+    padded[:len(table)] = table
+    owned = stencil.Float(padded.ravel()) + 0  # Dr.Jit's memory is aligned as packed gathers need
+    dr.eval(owned)
+    return owned
+
+
+def pack(stencil: Stencil, color: list[Float], surface: list[Float]) -> Float:
+    """History of a frame: 8 words a lane, colour, ID, normal, depth."""
+    id_, nx, ny, nz, depth = surface
+    packed = dr.empty(stencil.Float, stencil.lanes * WORDS)
+    words = stencil.ArrayXf([*color, stencil.Float(id_), nx, ny, nz, depth])
+    dr.scatter(packed, words, dr.arange(stencil.UInt, stencil.lanes))
+    return packed
+
+
+def reproject(stencil: Stencil, surface: list[Float], table: Float, dual: list[Float],
+              history: Float, tests: Tests, limits: list[Float]) -> tuple[list[Float], Any]:
+    """Colour of the previous frame where each pixel's surface was.
+
+    Args:
+        surface: ID, normal (3), depth of the current frame. table: `load_table`.
+        dual: B'^T, nine numbers, row by row. history: `pack` of the previous frame.
+        tests: `tests.nearest` alone is read; limits: min_cosine, plane_tolerance.
+    Returns:
+        three arrays, and the mask of pixels that have a history.
+    """
+    float_t, int_t = stencil.Float, stencil.Int
+    id_, *normal, depth = surface
+    objects = dr.width(table) // _ROW
+    known = (id_ >= 0) & (id_ < objects)
+    quad = stencil.UInt(dr.select(known, id_, 0)) * (_ROW // 4)
+    rows = [dr.gather(stencil.Array4f, table, quad + r) for r in range(6)]
+    row, column = stencil.pixel()
+    u = [float_t(column) + 0.5, float_t(row) + 0.5, float_t(1)]
+    inverse_depth = 1 / depth
+    d = [dr.fma(e.w, inverse_depth, dot([e.x, e.y, e.z], u)) for e in rows[:3]]
+    scale = 1 + d[2]
+    x = u[0] + (d[0] - u[0] * d[2]) / scale
+    y = u[1] + (d[1] - u[1] * d[2]) / scale
+    inside = (known & (scale > 1e-6) & (x >= 0) & (x < stencil.width)
+              & (y >= 0) & (y < stencil.height))
+    x, y = dr.select(inside, x, 0.5), dr.select(inside, y, 0.5)
+
+    def tap(column: Any, row: Any) -> tuple[list[Float], Float]:
+        lane = stencil.UInt(row * stencil.stride + column)
+        words = dr.gather(stencil.ArrayXf, history, lane, shape=(WORDS, stencil.lanes))
+        return [words[i] for i in range(3)], words
+
+    if tests.nearest:
+        color, words = tap(int_t(x), int_t(y))
+        return color, inside & (words[3] == float_t(id_))
+
+    expected = transform([[r.x, r.y, r.z] for r in rows[3:]], normal)
+    plane = transform([dual[:3], dual[3:6], dual[6:]], expected)  # n' . X' = z' plane . u'
+    depth = depth * scale
+    offset = depth * dot(plane, [x, y, float_t(1)])
+    smooth = dot(normal, normal) > 0.25
+    left, top = dr.floor(x - 0.5), dr.floor(y - 0.5)
+    fx, fy = x - 0.5 - left, y - 0.5 - top
+    sums, total = [float_t(0)] * 3, float_t(0)
+    for dy in (0, 1):
+        for dx in (0, 1):
+            column, row = int_t(left) + dx, int_t(top) + dy
+            on_screen = ((column >= 0) & (column < stencil.width)
+                         & (row >= 0) & (row < stencil.height))
+            color, words = tap(dr.select(on_screen, column, 0), dr.select(on_screen, row, 0))
+            center = [float_t(column) + 0.5, float_t(row) + 0.5, float_t(1)]
+            tap_normal, tap_depth = [words[4], words[5], words[6]], words[7]
+            near = dr.abs(tap_depth * dot(plane, center) - offset) < limits[1] * depth
+            turned = dot(expected, tap_normal) > limits[0]
+            passes = on_screen & (words[3] == float_t(id_)) & (~smooth | (near & turned))
+            weight = dr.select(passes, (fx if dx else 1 - fx) * (fy if dy else 1 - fy), 0)
+            sums = [dr.fma(weight, c, s) for c, s in zip(color, sums)]
+            total += weight
+    valid = inside & (total >= LEAST_WEIGHT)
+    scale = 1 / dr.select(valid, total, 1)
+    return [s * scale for s in sums], valid
+
+
+def check_motion(previous: Frame, current: Frame) -> None:
+    """InputError where two frames cannot follow one another."""
+    if len(previous.world_from_object) != len(current.world_from_object):
+        raise InputError(
+            f"frame {current.index} has {len(current.world_from_object)} objects, the frame "
+            f"before it {len(previous.world_from_object)}: they are not of one sequence")

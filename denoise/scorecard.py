@@ -1,0 +1,125 @@
+"""What scores.json and scores.csv hold, and reading it back.
+
+`Scores` is the JSON file as it stands: strict JSON, so a number that was not measured (no
+reference, no time) is null, and nothing is ever NaN or infinite. The values of `METRICS` stand
+beside the declared fields, under their names: `scores.methods["input"]["psnr_srgb"]`.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+from pydantic import ConfigDict, FiniteFloat, model_serializer
+
+from render.json_file import JsonFile, format_json, read_json
+
+from .metrics import METRICS
+
+INPUT = "input"
+"""The method that does nothing: the noisy frames themselves."""
+
+
+class Measured(JsonFile):
+    """Fields of its own, and one number or null for each metric."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, FiniteFloat | None]
+
+    def __getitem__(self, metric: str) -> float | None:
+        return self.__pydantic_extra__.get(metric)
+
+    @model_serializer(mode="wrap")
+    def _rows_last(self, serialize: Any) -> dict[str, Any]:
+        data = serialize(self)  # the summary is read first, so it stands first
+        return {key: data[key] for key in sorted(data, key=lambda key: key == "per_frame")}
+
+
+class FrameScore(Measured):
+    """One frame of one method. ms: time to denoise it, without reading and writing files."""
+
+    frame: int
+    ms: FiniteFloat | None
+    non_finite_pixels: int
+
+
+class MethodScore(Measured):
+    """One method over the sequence; its metrics are means over `per_frame`.
+
+    Attributes:
+        ms_per_frame: median over the frames after the first. first_ms: the first, which
+            includes compiling. Both null for the input.
+        non_finite_pixels: sum over frames; such pixels were scored as black.
+        device, threads, parameters, versions: of the run that made the results.
+    """
+
+    ms_per_frame: FiniteFloat | None
+    first_ms: FiniteFloat | None
+    non_finite_pixels: int
+    device: str
+    threads: int | None
+    parameters: dict[str, Any]
+    versions: dict[str, str]
+    per_frame: list[FrameScore]
+
+
+class Scores(JsonFile):
+    """scores.json.
+
+    Attributes:
+        frames: numbers of the frames scored. size: width, height.
+        reference_spp: null where there is no reference.
+        reference_floor_db: PSNR that a perfect image is expected to get against this noisy
+            reference, mean over frames; per frame in `reference_floor_per_frame`.
+        versions: of what rendered the frames.
+        tone_map: what "srgb" means in the names of metrics.
+        notes: what a reader must know, one sentence each.
+    """
+
+    scene: str
+    frames: list[int]
+    size: tuple[int, int]
+    seed: int | None
+    spp: int
+    reference_spp: int | None
+    reference_floor_db: FiniteFloat | None
+    reference_floor_per_frame: dict[int, FiniteFloat]
+    tone_map: str
+    versions: dict[str, str]
+    notes: list[str]
+    methods: dict[str, MethodScore]
+
+    @property
+    def has_reference(self) -> bool:
+        return self.reference_spp is not None
+
+    def ordered(self) -> list[str]:
+        """Names of the methods: input, then from fast to slow, then those without a time."""
+        def key(name: str) -> tuple[bool, bool, float]:
+            ms = self.methods[name].ms_per_frame
+            return name != INPUT, ms is None, ms or 0.0
+
+        return sorted(self.methods, key=key)
+
+    def json_text(self) -> str:
+        return format_json(self)
+
+    def csv_text(self) -> str:
+        """One row for each method and frame."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(["method", "frame", *METRICS, "ms", "reference_floor_db",
+                         "non_finite_pixels"])
+        for name, method in self.methods.items():
+            for row in method.per_frame:
+                writer.writerow([name, row.frame, *(row[m] for m in METRICS), row.ms,
+                                 self.reference_floor_per_frame.get(row.frame),
+                                 row.non_finite_pixels])
+        return text.getvalue()
+
+
+def read_scores(path: Path) -> Scores:
+    """Scores of a scores.json; InputError where it is missing or is none."""
+    return read_json(path, Scores)

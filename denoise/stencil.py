@@ -1,0 +1,288 @@
+"""The one place that knows how images lie in memory: padded planes, shifted views, frozen steps.
+
+A kernel here runs over the *lanes* of a grid: the h rows of an image, each followed by a gutter of
+`reach` pixels that is also the left border of the next row, so that no kernel tests for a border.
+
+- A **plane** is one channel in persistent memory, with `reach` rows above and below. What lies
+  outside the image holds a fixed value chosen by the kernel (one that gets weight 0).
+- A **tap** is a plane seen from a neighbour, `plane[y + dy, x + dx]` for all lanes at once. On the
+  CPU it is a view of the same memory at another offset: one unaligned vector load, where a gather
+  of 16 lanes costs as much as 15 such loads. On CUDA, where neighbouring gathers coalesce, it is a
+  gather with an offset that the kernel takes as an argument. The `gather` layout also runs on
+  the CPU, where the tests compare it with the views. It has not been run on a GPU.
+- A **step** is a traced function that is recorded once and replayed (`dr.freeze`).
+
+A kernel's results are fresh arrays, one number a lane. `Planes.store` copies them into planes: a
+scatter would cost five times as much, and in a frozen function it silently writes to a copy.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from render import backend
+from render.errors import InputError
+
+Float = Any  # a one-dimensional array of drjit.llvm or drjit.cuda, known at run time
+Offset = tuple[int, int]
+
+_TAIL = 64  # floats after the last lane that a vector load may touch
+_LINE = 16  # floats in a cache line
+_SETS = 64  # sets of a first-level cache: lines that far apart displace each other
+
+
+def _round_up(n: int, multiple: int) -> int:
+    return -(-n // multiple) * multiple
+
+
+class Stencil:
+    """The grid of an image and of the neighbours within `reach` pixels.
+
+    Attributes:
+        height, width: of the image, pixels. reach: largest |dx|, |dy| of a tap.
+        stride: lanes a row. lanes: lanes of the grid.
+        Float, Int, UInt: Dr.Jit array types of the device.
+
+    Raises:
+        InputError: an empty image, an unknown device or layout.
+    """
+
+    def __init__(self, height: int, width: int, reach: int, device: str = "auto",
+                 layout: str | None = None) -> None:
+        if height < 1 or width < 1:
+            raise InputError(f"an image of {width}x{height} pixels is empty: use 1x1 or more")
+        device = backend.choose(device)
+        self.layout = layout or ("views" if device == "llvm" else "gather")
+        if self.layout not in ("views", "gather") or (self.layout, device) == ("views", "cuda"):
+            raise InputError(f"layout '{self.layout}' does not exist on {device}: use gather")
+        self.height, self.width, self.reach = height, width, max(reach, 1)
+        self.stride = _spread(width + self.reach)
+        self.lanes = height * self.stride
+        self.planes_made = 0
+        module = _module(device)
+        self.Float, self.Int, self.UInt = module.Float, module.Int, module.UInt
+        self.Array4f, self.ArrayXf = module.Array4f, module.ArrayXf
+        self.backend = dr.JitBackend.LLVM if device == "llvm" else dr.JitBackend.CUDA
+
+    @property
+    def top(self) -> int:
+        """Where pixel (0, 0) lies in a plane, floats from its start."""
+        return _round_up(self.reach * self.stride + self.reach, _LINE)
+
+    @property
+    def size(self) -> int:
+        """Floats in a plane."""
+        return _round_up(self.top + self.lanes + self.reach * self.stride + self.reach, _LINE) + _TAIL
+
+    def pixel(self) -> tuple[Any, Any]:
+        """(row, column) of each lane as UInt; the gutter repeats the last column."""
+        lane = dr.arange(self.UInt, self.lanes)
+        row = lane // self.stride
+        return row, dr.minimum(lane - row * self.stride, self.width - 1)
+
+    def planes(self, outside: Sequence[float]) -> Planes:
+        """Persistent planes, one for each value in `outside`, which their border holds."""
+        return Planes(self, tuple(outside))
+
+    def load(self, image: np.ndarray) -> list[Float]:
+        """(h, w) or (h, w, c) image to one array of lanes a component. Traced, not evaluated."""
+        of_type = self.Int if image.dtype == np.int32 else self.Float
+        flat = of_type(np.ascontiguousarray(image).reshape(-1))
+        components = 1 if image.ndim == 2 else image.shape[2]
+        row, column = self.pixel()
+        start = (row * self.width + column) * components
+        return [dr.gather(of_type, flat, start + c) for c in range(components)]
+
+    def image(self, arrays: Sequence[Float]) -> np.ndarray:
+        """Arrays of lanes to an (h, w, c) float32 image, (h, w) for one. The image is new memory."""
+        lane = dr.arange(self.UInt, self.lanes)
+        row = lane // self.stride
+        column = lane - row * self.stride
+        flat = dr.empty(self.Float, self.height * self.width * len(arrays))
+        start = (row * self.width + column) * len(arrays)
+        for c, array in enumerate(arrays):
+            dr.scatter(flat, array, start + c, column < self.width)
+        dr.eval(flat)
+        shape = (self.height, self.width) + ((len(arrays),) if len(arrays) > 1 else ())
+        return flat.numpy().reshape(shape)
+
+    def opaque(self, value: float) -> Float:
+        """A number that a kernel takes as an argument: another value recompiles nothing."""
+        return dr.opaque(self.Float, float(value))
+
+    def constant(self, value: float) -> Float:
+        """An array of lanes that holds one number."""
+        return dr.opaque(self.Float, float(value), self.lanes)
+
+
+def _spread(least: int) -> int:
+    """Smallest stride from `least` on at which rows 16 or fewer apart fall into different sets.
+
+    With 5 rows of taps in each of 8 planes, a stride such as 544 makes all of them share a few
+    sets of the cache, and a kernel four times slower.
+    """
+    def crowded(stride: int) -> bool:
+        return any(min(m * stride % _SETS, -m * stride % _SETS) < 8 for m in (1, 2, 3, 4))
+
+    return next(stride for stride in range(least, least + _SETS) if not crowded(stride))
+
+
+def _module(device: str) -> ModuleType:
+    if device == "llvm":
+        import drjit.llvm as module
+    else:
+        import drjit.cuda as module
+    return module
+
+
+class Planes:
+    """A few channels of one grid in persistent, padded memory."""
+
+    def __init__(self, stencil: Stencil, outside: tuple[float, ...]) -> None:
+        self.stencil = stencil
+        self._views: dict[tuple[int, int, int], Float] = {}
+        self._memory, self._arrays = [], []
+        for value in outside:
+            if stencil.layout == "views":
+                self._memory.append(_allocate(stencil.size, value, stencil.planes_made))
+                stencil.planes_made += 1
+            else:
+                self._arrays.append(dr.opaque(stencil.Float, float(value), stencil.size))
+
+    def store(self, arrays: Sequence[Float]) -> None:
+        """Copy evaluated arrays of lanes into the planes; their gutters are left out."""
+        s = self.stencil
+        if s.layout == "gather":
+            lane = dr.arange(s.UInt, s.lanes)
+            inside = lane % s.stride < s.width
+            for plane, array in zip(self._arrays, arrays, strict=True):
+                dr.scatter(plane, array, lane + s.top, inside)
+            dr.eval(self._arrays)
+            return
+        for memory, array in zip(self._memory, arrays, strict=True):
+            rows = memory[s.top:s.top + s.lanes].view(np.uint16).reshape(s.height, 2 * s.stride)
+            values = array.numpy().view(np.uint16).reshape(s.height, 2 * s.stride)
+            np.copyto(rows[:, :2 * s.width], values[:, :2 * s.width])  # floats here are misaligned
+
+    def taps(self, offsets: Sequence[Offset]) -> Taps:
+        """The planes seen from the neighbours at offsets (dy, dx)."""
+        s = self.stencil
+        if any(max(abs(dy), abs(dx)) > s.reach for dy, dx in offsets):
+            raise ValueError(f"a tap lies farther than the stencil's reach of {s.reach} pixels")
+        starts = [s.top + dy * s.stride + dx for dy, dx in offsets]
+        if s.layout == "gather":
+            return Taps([], self._arrays, [dr.opaque(s.UInt, start) for start in starts], s.lanes,
+                        s.backend)
+        count = range(len(self._memory))
+        return Taps([[self._view(c, start) for c in count] for start in starts], [], [], s.lanes,
+                    s.backend)
+
+    def _view(self, channel: int, start: int) -> Float:
+        """The same offset gives the same variable, so that a frozen function sees the alias."""
+        key = (channel, start, self.stencil.lanes)
+        if key not in self._views:
+            memory = self._memory[channel][start:start + self.stencil.lanes]
+            self._views[key] = self.stencil.Float(memory)
+        return self._views[key]
+
+
+def _allocate(size: int, value: float, index: int) -> np.ndarray:
+    """Float32 memory that starts two bytes after a cache line, each plane's in another set.
+
+    A view at a multiple of 64 bytes is another kernel and another recording to Dr.Jit than one
+    that is not. Two bytes off, no view is at one; vector loads don't mind.
+    """
+    memory = np.empty(4 * (size + 2 * _SETS * _LINE), np.uint8)
+    page = -memory.ctypes.data % (4 * _SETS * _LINE)
+    start = page + 4 * _LINE * (index * 13 % _SETS) + 2
+    floats = memory[start:start + 4 * size].view(np.float32)
+    floats.fill(value)
+    return floats
+
+
+@dataclass(frozen=True)
+class Taps:
+    """Planes at a few offsets: `taps.at(t)` lists the planes as seen from the t-th neighbour."""
+
+    views: list[list[Float]]
+    planes: list[Float]
+    starts: list[Any]
+    lanes: int
+    backend: dr.JitBackend
+
+    def __len__(self) -> int:
+        return len(self.views) or len(self.starts)
+
+    def next(self) -> None:
+        """Call at the end of a tap: keeps it apart from the following one while compiling.
+
+        Dr.Jit orders operations by scope; with one scope a tap, independent accumulators
+        interleave and fewer values wait in registers (1.2 to 2 times faster). An internal call.
+        """
+        dr.detail.new_scope(self.backend)
+
+    def at(self, t: int) -> list[Float]:
+        if self.views:
+            return self.views[t]
+        lane = dr.arange(type(self.starts[t]), self.lanes) + self.starts[t]
+        return [dr.gather(type(plane), plane, lane) for plane in self.planes]
+
+
+class Step:
+    """A function of Dr.Jit arrays and taps, recorded at its first call and replayed after that.
+
+    Make one for each grid and each place it is called from: a recording holds the size of the
+    grid, and which of its arguments share memory. Other numbers of lanes record again.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._frozen = dr.freeze(function, state_fn=_sizes, warn_after=1000)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._frozen(*arguments)
+
+    @property
+    def recordings(self) -> int:
+        return self._frozen.n_recordings
+
+
+def _sizes(*arguments: Any) -> tuple[int, ...]:
+    return tuple(a.lanes if isinstance(a, Taps) else dr.width(a[0]) for a in arguments
+                 if isinstance(a, Taps) or (isinstance(a, list) and a))
+
+
+# 2^f on [-1/2, 1/2] as a cubic: relative error below 8e-5.
+_EXP2 = (0.99992811, 0.69326099, 0.24261114, 0.05517166)
+_MAGIC = 1.5 * 2**23  # adding it rounds a float to an integer, in the low bits of the sum
+
+
+def exp2(x: Float) -> Float:
+    """2^x for x <= 0 with a relative error below 8e-5; 2^-126 below that, also for -inf and NaN.
+
+    `dr.exp2` costs more than the rest of a tap of a bilateral filter. This is a cubic in the
+    fraction, with the integer part added to the bits of the exponent.
+    """
+    float_t, int_t = type(x), dr.int32_array_t(type(x))
+    x = dr.select(x > -126, x, -126)  # one instruction; dr.maximum's NaN rules cost more
+    rounded = x + _MAGIC
+    f = x - (rounded - _MAGIC)
+    c0, c1, c2, c3 = _EXP2
+    power = dr.fma(dr.fma(dr.fma(f, c3, c2), f, c1), f, c0)
+    exponent = dr.reinterpret_array(int_t, rounded) << 23
+    return dr.reinterpret_array(float_t, dr.reinterpret_array(int_t, power) + exponent)
+
+
+def timed(function: Callable[[], Any]) -> tuple[Any, float]:
+    """(result, milliseconds) of a call, kernels included: they run asynchronously otherwise."""
+    dr.sync_thread()
+    start = time.perf_counter()
+    result = function()
+    dr.sync_thread()
+    return result, 1e3 * (time.perf_counter() - start)

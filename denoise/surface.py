@@ -1,0 +1,158 @@
+"""What a frame's guides say about the surface in each pixel, in camera space.
+
+Symbols: u = (x + 1/2, y + 1/2, 1) a pixel's centre on the screen; z camera-space depth; X
+position; n unit normal; B = camera_from_screen (3x3), so that X = z B u.
+
+Positions are rebuilt from the depth, relative to the camera: float32 world positions of a scene
+1e6 units from the origin are 0.06 units apart. Filters only use differences of positions and
+angles between normals, which are the same in camera space as in world space.
+
+A pixel has a surface where its object ID is not negative, its depth is positive and its normal
+has a direction; where one of these is missing or not finite it counts as background, with n = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import numpy as np
+
+from render.errors import InputError
+from render.frame import Frame
+
+from .stencil import Float, Stencil
+
+GUIDES = ("normal", "depth", "id")
+_FARTHEST = 1e15  # a greater depth counts as background: its square would overflow
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Arrays of lanes, traced and not yet evaluated.
+
+    Attributes:
+        exists: mask, whether there is a surface.
+        normal: n, three arrays. position: X, three arrays. depth: z. id: object ID, -1 for none.
+        inverse_depth: 1 / z, 0 where nothing exists.
+        plane: 1 / z of the tangent plane changes by plane[0] a column and plane[1] a row.
+        plane_distance: n . X, the (negative) distance of the camera from the tangent plane.
+    """
+
+    exists: Float
+    normal: list[Float]
+    position: list[Float]
+    depth: Float
+    id: Float
+    inverse_depth: Float
+    plane: tuple[Float, Float]
+    plane_distance: Float
+
+
+def camera_from_screen(frame: Frame) -> np.ndarray:
+    """B: (3, 3) float64 that maps a pixel's u to its camera-space position at depth 1.
+
+    Raises:
+        InputError: the frame's matrices are not those of a pinhole camera.
+    """
+    screen_from_camera = _screen_from_camera(frame)
+    try:
+        return np.linalg.inv(screen_from_camera)
+    except np.linalg.LinAlgError:
+        raise InputError(f"the matrices of frame {frame.index} do not project to a screen: "
+                         "screen_from_world is singular") from None
+
+
+def _screen_from_camera(frame: Frame) -> np.ndarray:
+    """Rows x, y and depth; a pinhole at the camera's origin has no fourth column."""
+    try:
+        world_from_camera = np.linalg.inv(frame.camera_from_world)
+    except np.linalg.LinAlgError:
+        raise InputError(f"camera_from_world of frame {frame.index} is singular") from None
+    return (frame.screen_from_world @ world_from_camera)[[0, 1, 3], :3]
+
+
+def read_surface(frame: Frame, stencil: Stencil) -> Surface:
+    """The guides of a frame on the lanes of a stencil.
+
+    Raises:
+        InputError: the frame lacks a guide, has another size, or its matrices don't project.
+    """
+    check_size(frame, stencil)
+    (id_,) = stencil.load(np.ascontiguousarray(frame["id"], np.int32))
+    (depth,) = stencil.load(np.asarray(frame["depth"], np.float32))
+    world_normal = stencil.load(np.asarray(frame["normal"], np.float32))
+    normal = transform(_opaque(stencil, frame.camera_from_world[:3, :3]), world_normal)
+    length2 = dot(normal, normal)
+    exists = (id_ >= 0) & (depth > 0) & (depth < _FARTHEST) & (length2 > 0.01) & (length2 < 100)
+    scale = dr.rsqrt(dr.select(exists, length2, 1))
+    normal = [dr.select(exists, n * scale, 0) for n in normal]
+    depth = dr.select(exists, depth, 1)
+    b = _opaque(stencil, camera_from_screen(frame))
+    row, column = stencil.pixel()
+    ray = transform(b, [stencil.Float(column) + 0.5, stencil.Float(row) + 0.5, stencil.Float(1)])
+    position = [dr.select(exists, depth * r, 0) for r in ray]
+    distance = dot(normal, position)
+    safe = dr.select(dr.abs(distance) > 1e-3 * depth, distance, -1e-3 * depth)  # grazing: not 0
+    plane = [dr.select(exists, dot(normal, [b[r][c] for r in range(3)]) / safe, 0) for c in (0, 1)]
+    return Surface(exists, normal, position, depth, dr.select(exists, id_, -1),
+                   dr.select(exists, 1 / depth, 0), (plane[0], plane[1]), safe)
+
+
+def check_size(frame: Frame, stencil: Stencil) -> None:
+    if (frame.height, frame.width) != (stencil.height, stencil.width):
+        raise InputError(f"frame {frame.index} is {frame.width}x{frame.height}, the denoiser's "
+                         f"state was made for {stencil.width}x{stencil.height}: make a new one")
+
+
+def read_color(frame: Frame, stencil: Stencil) -> list[Float]:
+    """The frame's colour as three arrays of lanes, repaired (see `repair`)."""
+    check_size(frame, stencil)
+    return stencil.load(repair(np.asarray(frame["color"], np.float32), frame["id"]))
+
+
+LARGEST = 1e18  # radiance beyond this is taken for a bad pixel: its square would overflow
+
+
+def repair(color: np.ndarray, id_: np.ndarray) -> np.ndarray:
+    """Replace each bad pixel by the mean of the good ones around it.
+
+    Bad: a component that is not finite, or beyond 1e18. The mean is over pixels of the same
+    object in a 3x3 window, or 5x5, 7x7, and so on until there is one; 0 if the object has none.
+    A bad pixel so stays one pixel, and no kernel needs to know of it.
+    """
+    extreme = np.abs(color).max()  # a NaN comes through, and fails the comparison
+    if extreme <= LARGEST:
+        return color
+    good = (np.abs(color) <= LARGEST).all(axis=2)
+    repaired = color.copy()
+    for y, x in np.argwhere(~good):
+        repaired[y, x] = _mean_around(color, good & (id_ == id_[y, x]), y, x)
+    return repaired
+
+
+def _mean_around(color: np.ndarray, usable: np.ndarray, y: int, x: int) -> np.ndarray | float:
+    if not usable.any():
+        return 0.0
+    for radius in range(1, max(usable.shape)):
+        window = (slice(max(y - radius, 0), y + radius + 1), slice(max(x - radius, 0), x + radius + 1))
+        if usable[window].any():
+            return color[window][usable[window]].mean(axis=0)
+    return 0.0
+
+
+def dot(a: list[Float], b: list[Float]) -> Float:
+    return dr.fma(a[0], b[0], dr.fma(a[1], b[1], a[2] * b[2]))
+
+
+def transform(matrix: list[list[Float]], vector: list[Float]) -> list[Float]:
+    return [dot(row, vector) for row in matrix]
+
+
+def _opaque(stencil: Stencil, matrix: np.ndarray) -> list[list[Float]]:
+    return [[stencil.opaque(x) for x in row] for row in matrix]
+
+
+def luminance(color: list[Float]) -> Float:
+    """Relative luminance of linear Rec. 709 radiance."""
+    return dr.fma(color[0], 0.2126, dr.fma(color[1], 0.7152, color[2] * 0.0722))

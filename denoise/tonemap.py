@@ -1,0 +1,33 @@
+"""The one tone map: linear Rec. 709 radiance to clipped sRGB, and back.
+
+Every dB, picture and movie goes through it, at exposure 1, so that they show the same thing.
+dB of different tone maps don't compare: name it wherever one stands (`TONE_MAP`).
+
+Source: IEC 61966-2-1:1999. Values are not quantised to 8 bits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+TONE_MAP = "clipped sRGB"
+
+
+def srgb_from_linear(linear: np.ndarray) -> np.ndarray:
+    """Display values in [0, 1] of linear radiance: clip to [0, 1], then the sRGB curve.
+
+    Any shape; floats keep their type. NaN stays NaN.
+    """
+    x = np.clip(linear, 0.0, 1.0)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+
+
+def linear_from_srgb(srgb: np.ndarray) -> np.ndarray:
+    """Inverse of `srgb_from_linear` on [0, 1], outside of which it clips."""
+    y = np.clip(srgb, 0.0, 1.0)
+    return np.where(y <= 0.04045, y / 12.92, ((y + 0.055) / 1.055) ** 2.4)
+
+
+def bytes_from_linear(linear: np.ndarray) -> np.ndarray:
+    """8-bit sRGB for pictures, rounded to nearest; NaN is black. Any shape."""
+    return np.rint(255 * srgb_from_linear(np.nan_to_num(linear, nan=0.0))).astype(np.uint8)

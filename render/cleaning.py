@@ -1,0 +1,42 @@
+"""Removing a sequence's files from a folder, and nothing else that a person may keep there."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from pathlib import Path
+
+from .atomic import is_temporary
+from .errors import InputError
+
+_OWN = re.compile(r"scores\.(json|csv)|pictures/[^/]+\.(png|mp4)|frames/\d{4,}\.(exr|json)"
+                  r"|reference/\d{4,}\.(exr|partial\.npz)|denoised/[^/]+/(\d{4,}\.exr|run\.json)")
+_FOLDERS = ("denoised/*", "frames", "reference", "denoised", "pictures")
+
+
+def remove_sequence(folder: Path) -> None:
+    """Remove a sequence's files but for the manifest, and those of its folders that get empty.
+
+    Raises:
+        InputError: a file cannot be removed.
+    """
+    folders = [path for place in _FOLDERS for path in folder.glob(place) if path.is_dir()]
+    remove_files(folder, folder, *folders)
+    for path in folders:
+        with contextlib.suppress(OSError):  # not empty
+            path.rmdir()
+
+
+def remove_files(folder: Path, *places: Path) -> None:
+    """Remove the files directly in `places` that the sequence in `folder` wrote there.
+
+    Raises:
+        InputError: a file cannot be removed.
+    """
+    for path in (path for place in places for path in place.glob("*")):
+        if _OWN.fullmatch(path.relative_to(folder).as_posix()) or is_temporary(path):
+            try:
+                path.unlink()
+            except OSError as error:
+                raise InputError(f"{path} could not be removed ({error.strerror}): "
+                                 "choose another output folder") from error

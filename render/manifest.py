@@ -1,0 +1,153 @@
+"""What a sequence and a denoiser's run say about themselves, in JSON beside the images."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, FiniteFloat, PlainSerializer, field_validator
+
+from .channels import CHANNELS
+from .errors import InputError
+from .json_file import JsonFile
+
+FORMAT = 1
+_MOST_FRAMES = 100_000
+
+
+def parse_frames(text: str) -> tuple[int, ...]:
+    """Frame numbers of '0:20' (0 to 19), '0:20:2', '5', or several of these with commas.
+
+    Raises:
+        InputError: not of this form, negative, none, or not in increasing order.
+    """
+    numbers: list[int] = []
+    for part in text.split(","):
+        match = re.fullmatch(r"\s*([0-9]{1,9})(?::([0-9]{1,9})(?::([1-9][0-9]{0,8}))?)?\s*", part)
+        if not match:
+            raise InputError(f"{text[:40]!r} are not frames: write 0:20 for 0 to 19, or 3,5,8")
+        start, stop, step = match.groups()
+        part_numbers = range(int(start), int(start) + 1 if stop is None else int(stop),
+                             int(step or 1))
+        if len(part_numbers) + len(numbers) > _MOST_FRAMES:
+            raise InputError(f"the frames {text[:40]!r} are more than {_MOST_FRAMES}")
+        numbers += part_numbers
+    if not numbers:
+        raise InputError(f"the frames {text[:40]!r} are none: write 0:20 for 0 to 19")
+    if any(b <= a for a, b in pairwise(numbers)):
+        raise InputError(f"the frames {text[:40]!r} are not in increasing order")
+    return tuple(numbers)
+
+
+def format_frames(frames: Iterable[int]) -> str:
+    """The shortest text that `parse_frames` reads as these increasing numbers."""
+    runs: list[list[int]] = []
+    for i in frames:
+        if runs and runs[-1][-1] == i - 1:
+            runs[-1].append(i)
+        else:
+            runs.append([i])
+    return ",".join(f"{r[0]}:{r[-1] + 1}" if len(r) > 1 else str(r[0]) for r in runs)
+
+
+def _frames(value: Any) -> tuple[int, ...]:
+    if not isinstance(value, str | list | tuple | range):
+        raise ValueError("should be text such as '0:20'")
+    return parse_frames(value if isinstance(value, str) else ",".join(map(str, value)))
+
+
+Size = Annotated[int, Field(ge=1, le=1 << 16)]
+Name = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]+$")]
+
+
+class Manifest(JsonFile):
+    """What a sequence is, in `manifest.json`.
+
+    `reference_spp` is None where there is no reference; `reference_filter` is "centre" where its
+    samples go through pixel centres, as a frame's do, "box" where they are spread over the pixel.
+    `seed` and `max_depth` are None for imports, where they are not known. `objects` are names
+    in order of ID. `fingerprint` is a hash of what the scene describes (or an import holds), so
+    that an edited scene is not taken for the old one.
+    """
+
+    format: Annotated[int, Field(ge=FORMAT, le=FORMAT)] = FORMAT
+    source: Literal["render", "games202"] = "render"
+    scene: Name
+    about: str = ""
+    frames: Annotated[tuple[int, ...], BeforeValidator(_frames),
+                      PlainSerializer(format_frames, return_type=str)]
+    width: Size
+    height: Size
+    fps: Annotated[FiniteFloat, Field(gt=0)] = 24.0
+    seed: Annotated[int, Field(ge=0)] | None = 0
+    spp: Annotated[int, Field(ge=1)] = 1
+    reference_spp: Annotated[int, Field(ge=1)] | None = None
+    reference_filter: Literal["centre", "box"] = "centre"
+    max_depth: Annotated[int, Field(ge=1)] | None = None
+    direct: Name = "mis"
+    sampler: Name = "pcg"
+    channels: Annotated[tuple[str, ...], Field(min_length=1)]
+    objects: Annotated[tuple[Name, ...], Field(min_length=1)]
+    fingerprint: str = ""
+    device: str = ""
+    versions: dict[str, str] = Field(default_factory=dict)
+    created: str = ""
+
+    @field_validator("channels")
+    @classmethod
+    def _known(cls, channels: tuple[str, ...]) -> tuple[str, ...]:
+        for name in channels:
+            if name not in CHANNELS:
+                raise ValueError(f"{name[:40]!r} is not a channel, the channels are "
+                                 f"{', '.join(CHANNELS)}")
+        return _unique(channels)
+
+    @field_validator("objects")
+    @classmethod
+    def _unique_objects(cls, objects: tuple[str, ...]) -> tuple[str, ...]:
+        return _unique(objects)
+
+
+# What two manifests of the same sequence have in common. The rest may change from run to run.
+_IDENTITY = ("source", "scene", "fingerprint", "width", "height", "fps", "seed", "spp",
+             "max_depth", "direct", "sampler", "channels", "objects")
+
+
+def first_difference(a: Manifest, b: Manifest) -> str | None:
+    """The first setting in which two manifests are of different sequences; None: of the same."""
+    both_have_references = a.reference_spp is not None and b.reference_spp is not None
+    keys = (*_IDENTITY, "reference_filter") if both_have_references else _IDENTITY
+    return next((key for key in keys if getattr(a, key) != getattr(b, key)), None)
+
+
+class Run(JsonFile):
+    """How a denoised result came to be, in `denoised/METHOD/run.json`.
+
+    `ms` holds milliseconds by frame number, reading and writing of files excluded; `first_ms`
+    the first call's, compilation included. Both are empty where they are not known.
+    """
+
+    method: Name
+    parameters: dict[str, Any] = Field(default_factory=dict)
+    device: str = ""
+    threads: int | None = None
+    versions: dict[str, str] = Field(default_factory=dict)
+    first_ms: FiniteFloat | None = None
+    ms: dict[int, FiniteFloat] = Field(default_factory=dict)
+
+
+def check_name(name: str, what: str) -> str:
+    """A name that is safe as a folder's; InputError otherwise."""
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,99}", name):
+        raise InputError(f"{name[:40]!r} is not a name for a {what}: use letters, digits, "
+                         "'.', '_', '+' and '-'")
+    return name
+
+
+def _unique(names: tuple[str, ...]) -> tuple[str, ...]:
+    if len(set(names)) < len(names):
+        twice = next(n for n in names if names.count(n) > 1)
+        raise ValueError(f"{twice[:80]!r} is listed twice")
+    return names

@@ -1,0 +1,297 @@
+"""A sequence on disk: frames, their references, and what denoisers made of them.
+
+    manifest.json               what the sequence is (render/manifest.py)
+    frames/0000.exr, .json      a frame's images (render/channels.py) and its matrices
+    reference/0000.exr          ground truth: color, and variance of the mean
+    denoised/METHOD/0000.exr    a result, R, G, B; run.json beside it says how it came to be
+    scores.json, scores.csv, pictures/
+
+File names come from frame numbers and checked names, never from what a file says. Every file is
+renamed into place when it is complete, so that a file that exists is whole, and a command that was
+interrupted goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+import zlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .atomic import read_bytes, write_bytes, write_text
+from .channels import CHANNELS
+from .cleaning import remove_files, remove_sequence
+from .errors import InputError
+from .exr import read_exr, read_header, write_exr
+from .frame import Frame
+from .json_file import format_json, read_json
+from .manifest import Manifest, Run, check_name, first_difference
+from .matrices import format_matrices, read_matrices
+
+_HALF_MAX = float(np.finfo(np.float16).max)
+
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Ground truth of a frame.
+
+    Attributes:
+        color: (h, w, 3) float32, linear radiance. variance: (h, w, 3) float32, of that mean.
+        spp: samples a pixel.
+    """
+
+    color: np.ndarray
+    variance: np.ndarray
+    spp: int
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """A folder that holds a sequence. Make one with `create`, read one with `open`.
+
+    All methods raise InputError for files that are missing, damaged or disagree with the
+    manifest, and where the disk refuses a write.
+    """
+
+    folder: Path
+    manifest: Manifest
+
+    @classmethod
+    def open(cls, folder: Path | str) -> Sequence:
+        """The sequence in a folder; InputError if there is none."""
+        folder = Path(folder)
+        path = folder / "manifest.json"
+        if not folder.exists():
+            raise InputError(f"{folder} does not exist: make a sequence there with "
+                             "`onespp render` or `onespp import`")
+        if not path.exists():
+            raise InputError(f"{folder} is not a sequence (it has no manifest.json): make one "
+                             "with `onespp render` or `onespp import`")
+        return cls(folder, read_json(path, Manifest))
+
+    @classmethod
+    def create(cls, folder: Path | str, manifest: Manifest, overwrite: bool = False) -> Sequence:
+        """The sequence in a folder, begun, or continued where it has the same settings.
+
+        When continued it keeps its files; its frames become the old and the new ones together,
+        and `reference_spp` the new one unless that is None. `overwrite` removes the files of
+        the sequence that is there (no others) and begins anew.
+
+        Raises:
+            InputError: the folder holds another sequence, or other files.
+        """
+        folder = Path(folder)
+        path = folder / "manifest.json"
+        if folder.exists() and not folder.is_dir():
+            raise InputError(f"{folder} is a file: choose another output folder")
+        if path.exists():
+            if overwrite:
+                remove_sequence(folder)
+            else:
+                manifest = _continued(folder, read_json(path, Manifest), manifest)
+        elif folder.exists() and any(not p.name.startswith(".") for p in folder.iterdir()):
+            raise InputError(f"{folder} holds files that are no sequence: choose another "
+                             "output folder")
+        text = format_json(manifest)
+        if not path.exists() or read_bytes(path) != text.encode():
+            write_text(path, text)
+        return cls(folder, manifest)
+
+    @property
+    def frames(self) -> list[int]:
+        """Frame numbers, increasing."""
+        return list(self.manifest.frames)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width)."""
+        return self.manifest.height, self.manifest.width
+
+    def has_frame(self, i: int) -> bool:
+        return self._path("frames", i).exists() and self._path("frames", i, "json").exists()
+
+    def read_frame(self, i: int, channels: Iterable[str] | None = None) -> Frame:
+        """A frame with the given channels (None: all that the manifest lists)."""
+        self._check(i)
+        names = list(self.manifest.channels if channels is None else channels)
+        for name in names:
+            if name not in self.manifest.channels:
+                raise InputError(f"the sequence {self.folder} lacks the channel '{name}' "
+                                 f"(it has {', '.join(self.manifest.channels)})")
+        matrices = self.read_matrices(i)
+        images = self._read(self._path("frames", i), names)
+        if "id" in images:
+            images["id"] = object_ids(self._path("frames", i), images["id"],
+                                      len(self.manifest.objects))
+        return Frame(i, images, *matrices)
+
+    def read_matrices(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """camera_from_world, screen_from_world, world_from_object of a frame, float64."""
+        return read_matrices(self._path("frames", i, "json"), i, self.manifest.objects)
+
+    def write_frame(self, frame: Frame, provenance: Mapping[str, str] | None = None) -> None:
+        """Write a frame's images and matrices; `provenance` goes into the EXR header."""
+        self._check(frame.index)
+        objects = self.manifest.objects
+        if frame.world_from_object.shape != (len(objects), 4, 4):
+            raise InputError(f"frame {frame.index} has {len(frame.world_from_object)} objects, "
+                             f"the manifest of {self.folder} lists {len(objects)}")
+        images = {name: frame[name] for name in self.manifest.channels}
+        write_text(self._path("frames", frame.index, "json"),
+                   format_matrices(frame.index, frame.camera_from_world, frame.screen_from_world,
+                                   dict(zip(objects, frame.world_from_object))))
+        self._write(self._path("frames", frame.index), images, provenance)
+
+    def has_reference(self, i: int) -> bool:
+        return self._path("reference", i).exists()
+
+    def reference_spp(self, i: int) -> int:
+        """Samples a pixel of a frame's reference."""
+        return self._spp(self._path("reference", i))
+
+    def read_reference(self, i: int) -> Reference:
+        path = self._path("reference", i)
+        images = self._read(path, ("color", "variance"))
+        return Reference(images["color"], images["variance"], self._spp(path))
+
+    def write_reference(self, i: int, reference: Reference,
+                        provenance: Mapping[str, str] | None = None) -> None:
+        self._check(i)
+        self._write(self._path("reference", i),
+                    {"color": reference.color, "variance": reference.variance},
+                    {**(provenance or {}), "spp": str(reference.spp)})
+
+    def read_partial(self, i: int) -> dict[str, np.ndarray] | None:
+        """State of an unfinished reference, None where there is none."""
+        path = self._path("reference", i, "partial.npz")
+        if not path.exists():
+            return None
+        try:
+            with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as arrays:
+                return dict(arrays)
+        except (OSError, ValueError, EOFError, KeyError, TypeError, NotImplementedError,
+                zipfile.BadZipFile, zlib.error) as error:
+            raise InputError(f"{path} is damaged: delete it, and the reference of frame {i} "
+                             "starts anew") from error
+
+    def write_partial(self, i: int, arrays: Mapping[str, np.ndarray | int]) -> None:
+        """Keep the state of an unfinished reference beside where it will be."""
+        self._check(i)
+        stream = io.BytesIO()
+        # (A positional dictionary would be one pickled array.)
+        np.savez(stream, allow_pickle=False,
+                 **{name: np.asarray(array) for name, array in arrays.items()})
+        write_bytes(self._path("reference", i, "partial.npz"), stream.getvalue())
+
+    def remove_partial(self, i: int) -> None:
+        self._path("reference", i, "partial.npz").unlink(missing_ok=True)
+
+    def methods(self) -> list[str]:
+        """Names of the methods that ran, sorted."""
+        return sorted(path.parent.name for path in self.folder.glob("denoised/*/run.json"))
+
+    def has_result(self, method: str, i: int) -> bool:
+        return self._result(method, i).exists()
+
+    def read_result(self, method: str, i: int) -> np.ndarray:
+        """(h, w, 3) float32 linear radiance."""
+        return self._read(self._result(method, i), ("color",))["color"]
+
+    def write_result(self, method: str, i: int, image: np.ndarray,
+                     provenance: Mapping[str, str] | None = None) -> None:
+        self._check(i)
+        self._write(self._result(method, i), {"color": image}, provenance)
+
+    def read_run(self, method: str) -> Run:
+        return read_json(self._result_folder(method) / "run.json", Run)
+
+    def write_run(self, method: str, run: Run) -> None:
+        write_text(self._result_folder(method) / "run.json", format_json(run))
+
+    def remove_results(self, method: str) -> None:
+        """Remove a method's results and what they say about themselves."""
+        remove_files(self.folder, self._result_folder(method))
+
+    def _check(self, i: int) -> None:
+        if i not in self.manifest.frames:
+            raise InputError(f"{self.folder} has no frame {i}: its frames are "
+                             f"{self.manifest.model_dump()['frames']}")
+
+    def _path(self, kind: str, i: int, suffix: str = "exr") -> Path:
+        return self.folder / kind / f"{i:04d}.{suffix}"
+
+    def _result_folder(self, method: str) -> Path:
+        return self.folder / "denoised" / check_name(method, "method")
+
+    def _result(self, method: str, i: int) -> Path:
+        return self._result_folder(method) / f"{i:04d}.exr"
+
+    def _read(self, path: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
+        rows = [CHANNELS[name] for name in names]
+        planes, _ = read_exr(path, [c for row in rows for c in row.exr], self.size)
+        return {row.name: _joined([planes[c] for c in row.exr]) for row in rows}
+
+    def _write(self, path: Path, images: Mapping[str, np.ndarray],
+               header: Mapping[str, str] | None) -> None:
+        planes = {}
+        for name, image in images.items():
+            row = CHANNELS[name]
+            expected = self.size + ((row.components,) if row.components > 1 else ())
+            if image.shape != expected:
+                raise InputError(f"{path} could not be written because '{name}' has shape "
+                                 f"{image.shape}, expected {expected}")
+            if row.half:
+                image = np.clip(image, -_HALF_MAX, _HALF_MAX)
+            image = image.astype(np.float16 if row.half else np.float32)
+            planes.update(zip(row.exr, np.moveaxis(np.atleast_3d(image), 2, 0)))
+        write_exr(path, planes, header)
+
+    def _spp(self, path: Path) -> int:
+        text = read_header(path).attributes.get("spp", "")
+        if not re.fullmatch(r"[1-9][0-9]{0,8}", text):
+            raise InputError(f"{path} does not say its samples a pixel ('spp' in its header): "
+                             "render the reference again")
+        return int(text)
+
+
+def object_ids(path: Path, image: np.ndarray, count: int) -> np.ndarray:
+    """The ID image of a file as int32.
+
+    Kernels index with it unchecked, so all but the whole numbers -1 to count - 1 are refused here.
+    """
+    if not ((image >= -1) & (image < count) & (image == np.floor(image))).all():
+        raise InputError(f"{path} has object IDs other than the whole numbers -1 to {count - 1}: "
+                         "make it again")
+    return image.astype(np.int32)
+
+
+def _joined(planes: list[np.ndarray]) -> np.ndarray:
+    """(h, w) or (h, w, c) float32 of one channel's planes."""
+    if len(planes) == 1:
+        return planes[0].astype(np.float32)
+    image = np.empty((*planes[0].shape, len(planes)), np.float32)
+    for c, plane in enumerate(planes):
+        image[..., c] = plane
+    return image
+
+
+def _continued(folder: Path, old: Manifest, new: Manifest) -> Manifest:
+    key = first_difference(old, new)
+    if key is not None:
+        a, b = getattr(old, key), getattr(new, key)
+        detail = f" ({a} there, {b} here)" if len(f"{a}{b}") < 100 else ""
+        if key == "fingerprint":
+            key, detail = "content", " (what it was made from has changed)"
+        raise InputError(f"{folder} holds a sequence with another {key}{detail}: use --overwrite "
+                         "to replace it, or another --out")
+    frames = tuple(sorted({*old.frames, *new.frames}))
+    with_references = old if new.reference_spp is None else new
+    return old.model_copy(update={
+        "frames": frames, "reference_spp": with_references.reference_spp,
+        "reference_filter": with_references.reference_filter})

@@ -1,0 +1,189 @@
+"""The formulas of the papers in float64 NumPy, as plainly as they can be written.
+
+World-space positions, textbook functions, one tap at a time: nothing is shared with the kernels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from render.frame import Frame
+
+Weight = Callable[[int, int, "Pixels", "Pixels"], np.ndarray]
+
+
+class Pixels:
+    """Images of a frame in float64, cut out and shifted by `at`."""
+
+    def __init__(self, **images: np.ndarray) -> None:
+        self.__dict__.update({k: np.asarray(v, np.float64) for k, v in images.items()})
+
+    def cut(self, rows: slice, columns: slice) -> Pixels:
+        return Pixels(**{k: v[rows, columns] for k, v in self.__dict__.items()})
+
+
+def pairs(pixels: Pixels, shape: tuple[int, int], dy: int, dx: int) -> tuple:
+    """(where, pixels p, pixels q = p + (dy, dx)) for all p whose q is inside the image."""
+    h, w = shape
+    rows = slice(max(-dy, 0), min(h - dy, h))
+    columns = slice(max(-dx, 0), min(w - dx, w))
+    if rows.start >= rows.stop or columns.start >= columns.stop:
+        return None, None, None
+    tap = (slice(rows.start + dy, rows.stop + dy), slice(columns.start + dx, columns.stop + dx))
+    return (rows, columns), pixels.cut(rows, columns), pixels.cut(*tap)
+
+
+def read(frame: Frame, **more: np.ndarray) -> Pixels:
+    surface = (frame["id"] >= 0) & (np.abs(frame["normal"]).sum(-1) > 0)
+    return Pixels(color=frame["color"], n=frame["normal"], position=frame["position"],
+                  z=frame["depth"], surface=surface, **more)
+
+
+def bilateral(frame: Frame, radius: int = 16, sigma_coord: float = 32, sigma_color: float = 0.6,
+              sigma_normal: float = 0.1, sigma_plane: float = 0.1) -> np.ndarray:
+    """The assignment's J; see denoise/bilateral.py."""
+    pixels, shape = read(frame), frame["id"].shape
+    total, weights = np.zeros((*shape, 3)), np.zeros(shape)
+    for dy in range(-radius, radius + 1):
+        for dx in range(-radius, radius + 1):
+            where, p, q = pairs(pixels, shape, dy, dx)
+            if where is None:
+                continue
+            both = (p.surface > 0) & (q.surface > 0)
+            cosine = np.where(both, (p.n * q.n).sum(-1), 1).clip(-1, 1)
+            d = q.position - p.position
+            distance = np.sqrt((d**2).sum(-1))
+            sine = np.where(both & (distance > 0), (p.n * d).sum(-1) / np.maximum(distance, 1e-30), 0)
+            j = np.exp(-(dy**2 + dx**2) / (2 * sigma_coord**2)
+                       - ((p.color - q.color)**2).sum(-1) / (2 * sigma_color**2)
+                       - np.arccos(cosine)**2 / (2 * sigma_normal**2) - sine**2 / (2 * sigma_plane**2))
+            j = np.where(p.surface == q.surface, j, 0)
+            total[where] += j[..., None] * q.color
+            weights[where] += j
+    return total / weights[..., None]
+
+
+def luminance(color: np.ndarray) -> np.ndarray:
+    return color @ [0.2126, 0.7152, 0.0722]
+
+
+def plane_weight_distance(p: Pixels, q: Pixels) -> np.ndarray:
+    """Distance of q from p's tangent plane, seen at p's depth, over p's depth; inf if unlike."""
+    both = (p.surface > 0) & (q.surface > 0)
+    distance = np.abs((p.n * (q.position - p.position)).sum(-1)) / np.where(both, q.z, 1)
+    return np.where(both, distance, np.where(p.surface == q.surface, 0, np.inf))
+
+
+def window_variance(frame: Frame, l: np.ndarray, sigma_plane: float, radius: int = 3) -> np.ndarray:
+    """Variance of l over the window's pixels within sigma_plane of the plane."""
+    pixels, shape = read(frame, l=l), l.shape
+    n, s1, s2 = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    for dy in range(-radius, radius + 1):
+        for dx in range(-radius, radius + 1):
+            where, p, q = pairs(pixels, shape, dy, dx)
+            if where is None:
+                continue
+            near = plane_weight_distance(p, q) < sigma_plane
+            n[where] += near
+            s1[where] += near * q.l
+            s2[where] += near * q.l**2
+    return np.maximum(s2 / n - (s1 / n)**2, 0)
+
+
+def blur3x3(image: np.ndarray) -> np.ndarray:
+    padded = np.pad(image, 1)
+    h, w = image.shape
+    return sum(padded[1 + dy:1 + dy + h, 1 + dx:1 + dx + w] * 0.25 / 2**abs(dy) / 2**abs(dx)
+               for dy in (-1, 0, 1) for dx in (-1, 0, 1))
+
+
+def atrous(frame: Frame, levels: int = 5, sigma_luminance: float = 4, sigma_plane: float = 0.01,
+           normal_power: float = 128) -> np.ndarray:
+    """SVGF's filter of one frame, not demodulated; see denoise/atrous.py."""
+    shape = frame["id"].shape
+    color = frame["color"].astype(np.float64)
+    variance = window_variance(frame, luminance(color), sigma_plane)
+    h = {0: 3 / 8, 1: 1 / 4, 2: 1 / 16}
+    for i in range(levels):
+        pixels = read(frame, c=color, v=variance, l=luminance(color),
+                      sigma_l=sigma_luminance * np.sqrt(blur3x3(variance)) + 1e-6)
+        total, squares, weights = np.zeros((*shape, 3)), np.zeros(shape), np.zeros(shape)
+        for ky in range(-2, 3):
+            for kx in range(-2, 3):
+                where, p, q = pairs(pixels, shape, ky << i, kx << i)
+                if where is None:
+                    continue
+                both = (p.surface > 0) & (q.surface > 0)
+                cosine = np.where(both, np.maximum((p.n * q.n).sum(-1), 0), 1)
+                w = (h[abs(ky)] * h[abs(kx)] * np.exp(-np.abs(p.l - q.l) / p.sigma_l)
+                     * cosine**normal_power * np.exp(-plane_weight_distance(p, q) / sigma_plane))
+                total[where] += w[..., None] * q.c
+                squares[where] += w**2 * q.v
+                weights[where] += w
+        color, variance = total / weights[..., None], squares / weights**2
+    return color
+
+
+def clamp_box(color: np.ndarray, radius: int, k: float) -> tuple[np.ndarray, np.ndarray]:
+    """(low, high) of each pixel: mean -+ k deviations of the window's pixels inside the image."""
+    h, w, _ = color.shape
+    low, high = np.empty((h, w, 3)), np.empty((h, w, 3))
+    for y in range(h):
+        for x in range(w):
+            window = color[max(y - radius, 0):y + radius + 1, max(x - radius, 0):x + radius + 1]
+            window = window.reshape(-1, 3).astype(np.float64)
+            mean, sigma = window.mean(0), window.std(0)
+            low[y, x], high[y, x] = mean - k * sigma, mean + k * sigma
+    return low, high
+
+
+def previous_screen(previous: Frame, frame: Frame) -> np.ndarray:
+    """(h, w, 3): x', y', z' of each pixel's world position, P' V' M' M^-1 X; NaN for background."""
+    h, w = frame["id"].shape
+    result = np.full((h, w, 3), np.nan)
+    for y, x in np.argwhere(frame["id"] >= 0):
+        i = frame["id"][y, x]
+        world = np.append(frame["position"][y, x].astype(np.float64), 1)
+        p = (previous.screen_from_world @ previous.world_from_object[i]
+             @ np.linalg.inv(frame.world_from_object[i]) @ world)
+        result[y, x] = p[0] / p[3], p[1] / p[3], p[3]
+    return result
+
+
+def reproject_bilinear(previous: Frame, frame: Frame, history: np.ndarray, min_cosine: float = 0.9,
+                       plane_tolerance: float = 0.02) -> np.ndarray:
+    """(h, w, 3) history of each pixel from tested bilinear taps; NaN where there is none."""
+    h, w = frame["id"].shape
+    screen, result = previous_screen(previous, frame), np.full((h, w, 3), np.nan)
+    for y, x in np.argwhere(frame["id"] >= 0):
+        i = frame["id"][y, x]
+        motion = previous.world_from_object[i] @ np.linalg.inv(frame.world_from_object[i])
+        n = motion[:3, :3] @ frame["normal"][y, x]
+        world = (motion @ np.append(frame["position"][y, x].astype(np.float64), 1))[:3]
+        px, py, z = screen[y, x]
+        if not (0 <= px < w and 0 <= py < h):
+            continue
+        left, top = int(np.floor(px - 0.5)), int(np.floor(py - 0.5))
+        total, weights = np.zeros(3), 0.0
+        for ty in (top, top + 1):
+            for tx in (left, left + 1):
+                if not (0 <= tx < w and 0 <= ty < h) or previous["id"][ty, tx] != i:
+                    continue
+                off_plane = abs(n @ (previous["position"][ty, tx] - world))
+                if n @ previous["normal"][ty, tx] > min_cosine and off_plane < plane_tolerance * z:
+                    weight = (1 - abs(px - 0.5 - tx)) * (1 - abs(py - 0.5 - ty))
+                    total += weight * history[ty, tx]
+                    weights += weight
+        if weights >= 0.01:
+            result[y, x] = total / weights
+    return result
+
+
+def accumulate(color: np.ndarray, history: np.ndarray, alpha: float = 0.2, k: float = 1.0,
+               radius: int = 3) -> np.ndarray:
+    """The assignment's blend; history NaN where there is none."""
+    low, high = clamp_box(color, radius, k)
+    blended = alpha * color + (1 - alpha) * np.clip(history, low, high)
+    return np.where(np.isfinite(history), blended, color)

@@ -1,0 +1,89 @@
+"""LLVM is found, checked and refused before Dr.Jit can crash on it. Each case in a new process."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from render import backend
+from render.arguments import parse_size
+from render.errors import InputError
+
+OLD = sorted(Path("/usr/lib").glob("*/libLLVM-1[0-5].so"))
+
+
+def onespp(*arguments: str, **environment: str) -> subprocess.CompletedProcess:
+    return subprocess.run([sys.executable, "-m", "onespp", *arguments], capture_output=True,
+                          text=True, env=os.environ | environment, timeout=120, check=False)
+
+
+def one_sentence(text: str) -> bool:
+    return text.startswith("onespp: ") and text.count("\n") == 1 and "Traceback" not in text
+
+
+@pytest.mark.skipif(not OLD, reason="no libLLVM older than 16 on this machine")
+@pytest.mark.parametrize("path", list(map(str, OLD)))
+def test_an_old_llvm_is_refused_in_a_sentence(path, tmp_path):
+    done = onespp("render", "box", "--out", str(tmp_path / "a"), "--size", "8x8",
+                  DRJIT_LIBLLVM_PATH=path)
+    assert done.returncode == 2
+    assert one_sentence(done.stderr)
+    assert path in done.stderr
+    assert "16" in done.stderr
+    assert not (tmp_path / "a").exists()
+
+
+@pytest.mark.parametrize("make", [lambda p: None, lambda p: p.write_text("not a library")])
+def test_a_wrong_llvm_path_is_refused_in_a_sentence(make, tmp_path):
+    path = tmp_path / "libLLVM.so"
+    make(path)
+    done = onespp("render", "box", "--out", str(tmp_path / "a"), "--size", "8x8",
+                  DRJIT_LIBLLVM_PATH=str(path))
+    assert done.returncode == 2
+    assert one_sentence(done.stderr)
+
+
+def test_doctor_names_a_wrong_llvm_and_survives(tmp_path):
+    done = onespp("doctor", DRJIT_LIBLLVM_PATH=str(OLD[0] if OLD else tmp_path / "none.so"))
+    assert done.returncode == 2
+    assert "BAD   LLVM" in done.stdout
+    assert "Traceback" not in done.stderr
+
+
+def test_doctor_finds_everything_here():
+    done = onespp("doctor")
+    assert done.returncode == 0, done.stdout
+    for subject in ("Python", "LLVM", "CUDA", "threads", "kernel cache", "test kernel"):
+        assert subject in done.stdout
+
+
+def test_the_llvm_in_use_is_new_enough():
+    llvm = backend.require_llvm()
+    assert llvm.usable
+    assert backend.llvm_version(llvm.path) == llvm.version
+
+
+def test_an_unknown_device_is_refused():
+    with pytest.raises(InputError, match="auto, llvm or cuda"):
+        backend.choose("gpu")
+
+
+@pytest.mark.parametrize(("text", "size"), [("640x360", (360, 640)), ("1x1", (1, 1)),
+                                            ("8X6", (6, 8))])
+def test_sizes_are_width_by_height(text, size):
+    assert parse_size(text) == size
+
+
+@pytest.mark.parametrize("text", ["0x4", "640", "4x", "-1x5", "99999x4", "4x4x4", "axb", ""])
+def test_odd_sizes_are_refused(text):
+    with pytest.raises(InputError, match="--size"):
+        parse_size(text)
+
+
+def test_denoise_imports_no_renderer():
+    code = "import sys, denoise.stream, denoise.score; sys.exit('mitsuba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

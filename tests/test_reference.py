@@ -1,0 +1,121 @@
+"""The reference: its variance, its passes, and going on after an interrupt."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from furnace import furnace
+from test_renderer import small_scene
+
+import render.job
+from render.errors import InputError
+from render.job import RenderJob, render_sequence
+from render.reference import Progress, pass_sizes, render_reference
+from render.renderer import Renderer
+from render.sampler import Sobol, keys_from_seed
+from render.sequence import Sequence
+from render.variant import mi
+
+SIZE = 12
+
+
+@pytest.mark.parametrize("spp", [2, 7, 8, 9, 64, 100, 513, 1024, 4096])
+def test_passes_add_up(spp):
+    sizes = pass_sizes(spp)
+    assert sum(sizes) == spp
+    assert len(sizes) >= min(spp, 8)
+    assert max(sizes) - min(sizes) <= 1
+
+
+def test_a_reference_of_one_sample_is_refused():
+    with pytest.raises(InputError, match="use 2 spp or more"):
+        pass_sizes(1)
+
+
+def test_the_stated_variance_is_that_of_the_mean():
+    renderer = Renderer(furnace(0.6, 0.8, 4), SIZE, SIZE)
+    references = [render_reference(renderer, 0, seed, 24) for seed in range(60)]
+    spread = np.var([r.color for r in references], axis=0, ddof=1).mean()
+    stated = np.mean([r.variance for r in references])
+    # 60 x 144 pixels x 3 correlated components: the ratio's own deviation is about 3 %.
+    assert stated == pytest.approx(spread, rel=0.12)
+
+
+def test_uneven_passes_estimate_the_same_variance():
+    rng = np.random.default_rng(1)
+    sizes = pass_sizes(37)
+    stated, means = [], []
+    for _ in range(3000):
+        progress = Progress.start(1, 1)
+        for n in sizes:
+            progress.add(rng.normal(2.0, 3.0, (n, 1, 1, 3)).sum(0), n)
+        reference = progress.reference()
+        stated.append(reference.variance.mean())
+        means.append(reference.color[0, 0, 0])
+    assert np.mean(stated) == pytest.approx(9 / 37, rel=0.05)
+    assert np.var(means) == pytest.approx(9 / 37, rel=0.1)
+
+
+def test_sobol_pairs_put_one_point_in_every_elementary_interval():
+    n = 64
+    sampler = Sobol(keys_from_seed(1), mi.UInt32(5), mi.UInt32(np.arange(n)))
+    for _ in range(4):
+        x, y = np.array(sampler.next_2d())
+        for columns in (1, 2, 4, 8, 16, 32, 64):
+            cell = np.floor(x * columns) * (n // columns) + np.floor(y * (n // columns))
+            assert len(set(cell)) == n
+        assert len(set(np.floor(np.array(sampler.next_1d()) * n))) == n
+
+
+def test_an_interrupted_reference_goes_on_to_the_same_bytes(tmp_path, monkeypatch):
+    job = RenderJob(small_scene(), [0, 1], SIZE, SIZE, reference_spp=32)
+    undisturbed = render_sequence(job, tmp_path / "undisturbed")
+
+    passes = 0
+    real = Renderer.sample_sum
+
+    def interrupted(self, *arguments):
+        nonlocal passes
+        passes += 1
+        if passes == 12:  # in the middle of frame 1's reference
+            raise KeyboardInterrupt
+        return real(self, *arguments)
+
+    monkeypatch.setattr(Renderer, "sample_sum", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        render_sequence(job, tmp_path / "stopped")
+    stopped = Sequence.open(tmp_path / "stopped")
+    assert stopped.has_reference(0)
+    assert not stopped.has_reference(1)
+    assert stopped.read_partial(1) is not None
+
+    done = passes
+    resumed = render_sequence(job, tmp_path / "stopped")
+    assert passes - done == 5  # of frame 1's 8 passes, 3 were kept
+    for i in (0, 1):
+        for kind in ("frames", "reference"):
+            name = f"{kind}/{i:04d}.exr"
+            assert (resumed.folder / name).read_bytes() == (undisturbed.folder / name).read_bytes()
+    assert resumed.read_partial(1) is None
+
+
+def test_a_complete_folder_is_left_alone(tmp_path, monkeypatch):
+    job = RenderJob(small_scene(), [0, 2], SIZE, SIZE, reference_spp=4)
+    sequence = render_sequence(job, tmp_path / "a")
+    before = {p: p.stat().st_mtime_ns for p in sequence.folder.rglob("*.*")}
+    monkeypatch.setattr(render.job, "Renderer", None)
+    render_sequence(job, tmp_path / "a")
+    assert {p: p.stat().st_mtime_ns for p in sequence.folder.rglob("*.*")} == before
+
+
+def test_another_sample_count_renders_the_reference_again(tmp_path):
+    job = RenderJob(small_scene(), [0], SIZE, SIZE, reference_spp=4)
+    render_sequence(job, tmp_path / "a")
+    more = RenderJob(small_scene(), [0], SIZE, SIZE, reference_spp=8)
+    assert render_sequence(more, tmp_path / "a").read_reference(0).spp == 8
+
+
+def test_an_edited_scene_is_not_taken_for_the_old_one(tmp_path):
+    render_sequence(RenderJob(small_scene(), [0], SIZE, SIZE), tmp_path / "a")
+    with pytest.raises(InputError, match=r"has changed.*--overwrite"):
+        render_sequence(RenderJob(small_scene(max_depth=4), [0], SIZE, SIZE), tmp_path / "a")

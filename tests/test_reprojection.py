@@ -1,0 +1,135 @@
+import numpy as np
+import oracles
+import pytest
+from synthetic import make_frame, translation, turn, with_images
+
+from denoise.reprojection import motion_table
+from denoise.temporal import Temporal
+
+# With alpha tiny and a clamp box that never binds, what comes out is the history itself.
+HISTORY = {"alpha": 1e-6, "color_box": 1e6}
+
+
+def history(previous, frame, **parameters):
+    """(h, w, 3) history of each pixel, NaN where there is none."""
+    marked = with_images(frame, color=np.full(frame["color"].shape, 100.0)
+                         + np.random.default_rng(0).normal(0, 1, frame["color"].shape))
+    method = Temporal(**HISTORY, **parameters)
+    _, state = method(previous, method.init(frame.height, frame.width))
+    result, _ = method(marked, state)
+    return np.where(result > 50, np.nan, result)
+
+
+MOTIONS = {
+    "still": (np.eye(4), np.eye(4)),
+    "camera moves": (translation(0.2, -0.1, 0.15), np.eye(4)),
+    "camera turns": (turn(0.03), np.eye(4)),
+    "board moves": (np.eye(4), translation(0.35, 0.2, 0.1)),
+    "board turns": (np.eye(4), turn(0.1) @ translation(0, 0.1, 0)),
+    "all move": (translation(0.1, 0.1, 0.2) @ turn(-0.02), translation(-0.3, 0.05, 0.0) @ turn(0.05)),
+}
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_agrees_with_the_chain_of_matrices_in_float64(name):
+    camera, board = MOTIONS[name]
+    previous = make_frame(23, 30)
+    frame = make_frame(23, 30, index=1, camera=camera, board=board)
+    expected = oracles.reproject_bilinear(previous, frame, previous["color"])
+    result = history(previous, frame)
+    agree = np.isfinite(expected) == np.isfinite(result)
+    assert agree.mean() > 0.995  # taps right at a test's limit may fall either way
+    both = np.isfinite(expected) & np.isfinite(result)
+    assert both.mean() > 0.5
+    np.testing.assert_allclose(result[both], expected[both], atol=2e-3)
+
+
+@pytest.mark.parametrize("nearest", [False, True])
+def test_what_does_not_move_lands_on_its_pixel_exactly(nearest):
+    """Also with a camera that is turned, far away and with an odd focal length."""
+    camera = translation(0.37, -1.21, 0.113) @ turn(0.7)
+    board = camera @ translation(0.1, 0.1, 0.2)
+    frames = [make_frame(31, 37, index=i, camera=camera, board=board, origin=(1e3, -777.7, 31.4))
+              for i in (0, 1)]
+    color = np.random.default_rng(1).random((31, 37, 3))
+    previous = with_images(frames[0], color=color)
+    seen = frames[0]["id"] >= 0
+    result = history(previous, frames[1], nearest=nearest)
+    assert seen.any()
+    np.testing.assert_allclose(result[seen], color[seen], atol=2e-4)
+    table = motion_table(frames[0], frames[1])
+    assert (table[:, :12] == 0).all()
+
+
+def test_pure_translation_by_whole_pixels_reprojects_exactly():
+    """A fronto-parallel board that moves by exactly three pixels: history is the shifted image."""
+    size, f = 33, 1.2 * 33
+    step = 3 * 6.0 / f
+    previous = make_frame(size, size, wall_end=-1e9)
+    frame = make_frame(size, size, index=1, wall_end=-1e9, board=translation(step, 0, 0))
+    color = np.random.default_rng(2).random((size, size, 3))
+    previous = with_images(previous, color=color)
+    for nearest in (False, True):
+        result = history(previous, frame, nearest=nearest)
+        on = (frame["id"] == 1)[:, 3:] & (previous["id"] == 1)[:, :-3]
+        assert on.sum() > 100
+        np.testing.assert_allclose(result[:, 3:][on], color[:, :-3][on], atol=2e-4)
+
+
+def test_a_million_units_from_the_origin_reprojects_as_well_as_at_it():
+    camera, board = translation(0.1, 0.1, 0.2) @ turn(-0.02), translation(-0.3, 0.05, 0) @ turn(0.05)
+    results = []
+    for origin in ((0, 0, 0), (1e6, -1e6, 1e6)):
+        previous = make_frame(23, 30, origin=origin)
+        frame = make_frame(23, 30, index=1, camera=camera, board=board, origin=origin)
+        results.append((history(previous, frame), motion_table(previous, frame)))
+    (near, near_table), (far, far_table) = results
+    assert np.abs(far_table - near_table).max() < 1e-6  # pixels a pixel
+    np.testing.assert_array_equal(np.isfinite(near), np.isfinite(far))
+    np.testing.assert_allclose(far, near, atol=1e-2)
+
+
+def test_disoccluded_and_new_pixels_have_no_history():
+    previous = make_frame(24, 32)
+    frame = make_frame(24, 32, index=1, board=translation(1.0, 0, 0))
+    uncovered = (previous["id"] == 1) & (frame["id"] == 0)
+    assert uncovered.sum() > 20
+    for nearest in (False, True):
+        assert np.isnan(history(previous, frame, nearest=nearest)[uncovered]).all()
+
+
+def test_what_comes_in_from_the_side_has_no_history():
+    previous = make_frame(20, 24, wall_end=1e9)
+    frame = make_frame(20, 24, index=1, wall_end=1e9, camera=turn(0.3))
+    result = history(previous, frame)
+    x, y, _ = np.moveaxis(oracles.previous_screen(previous, frame), -1, 0)
+    assert (x >= 24).sum() > 20
+    assert np.isnan(result[x >= 24]).all()
+    assert np.isfinite(result[(x < 23) & (y > 1) & (y < 19)]).all()
+
+
+def test_background_has_no_history():
+    frame = make_frame(20, 24, wall_end=0.5)
+    result = history(frame, make_frame(20, 24, index=1, wall_end=0.5))
+    assert (frame["id"] < 0).any()
+    assert np.isnan(result[frame["id"] < 0]).all()
+
+
+def test_the_plane_and_normal_tests_reject_another_surface_of_the_same_object():
+    previous = make_frame(20, 24, wall_end=1e9)
+    frame = make_frame(20, 24, index=1, wall_end=1e9)
+    wall = np.argwhere(frame["id"] == 0)[5]
+    for channel, value in (("depth", 1.2 * previous["depth"]), ("normal", -previous["normal"])):
+        other = with_images(previous, **{channel: value})
+        assert np.isnan(history(other, frame)[tuple(wall)]).all()
+        assert np.isfinite(history(other, frame, nearest=True)[tuple(wall)]).all()
+
+
+def test_an_object_shrunk_to_nothing_has_no_history():
+    previous = make_frame(9, 9)
+    frame = make_frame(9, 9, index=1)
+    matrices = frame.world_from_object.copy()
+    matrices[1] = 0
+    object.__setattr__(frame, "world_from_object", matrices)
+    assert np.isnan(history(previous, frame)[frame["id"] == 1]).all()
+    assert np.isfinite(history(previous, frame)[frame["id"] == 0]).all()
