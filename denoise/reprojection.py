@@ -108,9 +108,7 @@ def load_table(table: np.ndarray, stencil: Stencil) -> Float:
     room = max(_FEWEST_OBJECTS, 1 << len(table).bit_length())
     padded = np.full((room, _ROW), np.nan, np.float32)
     padded[:len(table)] = table
-    owned = stencil.Float(padded.ravel()) + 0  # Dr.Jit's memory is aligned as packed gathers need
-    dr.eval(owned)
-    return owned
+    return stencil.table(padded)
 
 
 def pack(stencil: Stencil, color: list[Float], surface: list[Float]) -> Float:

@@ -117,6 +117,14 @@ class Stencil:
         """A number that a kernel takes as an argument: another value recompiles nothing."""
         return dr.opaque(self.Float, float(value))
 
+    def table(self, values: np.ndarray) -> Float:
+        """A small array for packed gathers, in memory aligned to 64 bytes: otherwise Dr.Jit
+        silently gathers word by word, and a step records again when the alignment changes."""
+        memory = np.empty(values.size + _LINE, np.float32)
+        start = -memory.ctypes.data % (4 * _LINE) // 4
+        memory[start:start + values.size] = values.ravel()
+        return self.Float(memory[start:start + values.size])
+
     def constant(self, value: float) -> Float:
         """An array of lanes that holds one number."""
         return dr.opaque(self.Float, float(value), self.lanes)

@@ -23,6 +23,7 @@ from .renderer import Renderer
 from .sequence import Reference
 
 LARGEST_PASS = 64  # samples; float32 sums inside a pass stay exact to ~1e-6
+MOST_PATHS = 1 << 24  # a pass; some seconds, after which it can be stopped
 FEWEST_PASSES = 8  # so that the variance has a few degrees of freedom
 
 
@@ -56,15 +57,16 @@ class Progress:
         return Reference(mean.astype(np.float32), variance.astype(np.float32), self.samples)
 
 
-def pass_sizes(spp: int) -> list[int]:
-    """Samples of each pass; their number depends on `spp` alone.
+def pass_sizes(spp: int, pixels: int = 1) -> list[int]:
+    """Samples of each pass, for images of that many pixels.
 
     Raises:
         InputError: fewer than 2 samples, which have no variance.
     """
     if spp < 2:
         raise InputError(f"a reference of {spp} spp has no variance: use 2 spp or more")
-    passes = min(spp, max(FEWEST_PASSES, -(-spp // LARGEST_PASS)))
+    largest = max(1, min(LARGEST_PASS, MOST_PATHS // pixels))
+    passes = min(spp, max(FEWEST_PASSES, -(-spp // largest)))
     size, larger = divmod(spp, passes)
     return [size + 1] * larger + [size] * (passes - larger)
 
@@ -80,7 +82,7 @@ def render_reference(renderer: Renderer, index: int, seed: int, spp: int, *,
         after_pass: called after every pass, to show or save the progress.
     """
     progress = progress or Progress.start(renderer.height, renderer.width)
-    for size in pass_sizes(spp)[progress.passes:]:
-        progress.add(renderer.sample_sum(index, seed, progress.samples, size, antialias), size)
+    for size in pass_sizes(spp, renderer.height * renderer.width)[progress.passes:]:
+        progress.add(renderer.sample_sum(index, seed, progress.passes, size, antialias), size)
         after_pass(progress)
     return progress.reference()

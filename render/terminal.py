@@ -26,6 +26,23 @@ SECONDS_BETWEEN_LINES = 5.0
 BAD_INPUT, INTERRUPTED = 2, 130
 
 
+class _Stop:
+    """Whether a signal has asked the job to stop.
+
+    Interrupting Dr.Jit while it traces a loop leaves it in a bad state, so a job stops at its
+    next step. A second signal does not wait.
+    """
+
+    asked = False
+
+    @classmethod
+    def ask(cls, *_: object) -> None:
+        if cls.asked:
+            raise KeyboardInterrupt
+        cls.asked = True
+        click.echo("onespp: stopping after this step (again: at once)", err=True)
+
+
 class Steps:
     """One part of a job: `advance(done)` with what is done so far, in the part's own unit."""
 
@@ -37,7 +54,9 @@ class Steps:
         self._task = bar.add_task(title, total=total, start=False) if bar else None
 
     def advance(self, done: float, note: str = "") -> None:
-        """`note` says a word more, such as a file's name."""
+        """`note` says a word more. A safe point: raises KeyboardInterrupt if asked to stop."""
+        if _Stop.asked:
+            raise KeyboardInterrupt
         if self._bar is not None and self._task is not None:
             if self._started is None:
                 self._bar.start_task(self._task)
@@ -73,12 +92,14 @@ def run(command: click.Command, arguments: Sequence[str] | None = None,
         name: str = "onespp") -> None:
     """Run a command line and exit: 0 done, 2 bad input, 130 interrupted.
 
-    SIGTERM stops a job as Ctrl-C does, so that what was finished is kept. Errors that are not
-    the user's keep their traceback: they are bugs.
+    Ctrl-C and SIGTERM stop a job at its next step, and what was finished is kept. Errors that are
+    not the user's keep their traceback: they are bugs.
     """
     from scenes.description import SceneError
 
-    signal.signal(signal.SIGTERM, _interrupt)
+    _Stop.asked = False
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _Stop.ask)
     try:
         command.main(args=list(arguments) if arguments is not None else None, prog_name=name,
                      standalone_mode=False)
@@ -112,10 +133,6 @@ _REASONS = {
     errno.EFBIG: "a file would be larger than allowed{where}: choose another --out",
     errno.EIO: "the disk reported an error{where}: check it, then run the same command again",
 }
-
-
-def _interrupt(*_: object) -> None:
-    raise KeyboardInterrupt
 
 
 def _stop(sentence: str) -> None:

@@ -1,0 +1,223 @@
+import drjit as dr
+import numpy as np
+import pytest
+from kernels import compiled
+from synthetic import make_frame, noisy, translation, with_images
+
+from denoise.assignment import Assignment, AssignmentAtrous
+from denoise.atrous import Atrous
+from denoise.bilateral import Bilateral
+from denoise.reprojection import load_table
+from denoise.stencil import Step, Stencil, Taps, exp2, timed
+from denoise.temporal import Temporal
+from render.errors import InputError
+
+LAYOUTS = ("views", "gather")
+
+
+def stencil_of(height, width, reach, layout="views"):
+    return Stencil(height, width, reach, "llvm", layout)
+
+
+def lanes(stencil, image):
+    return [dr.copy(x) for x in stencil.load(np.asarray(image, np.float32))]
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize(("height", "width", "reach"), [(1, 1, 1), (1, 7, 3), (5, 3, 4), (13, 17, 2)])
+def test_taps_are_the_shifted_image_with_the_outside_value_around_it(layout, height, width, reach):
+    stencil = stencil_of(height, width, reach, layout)
+    image = np.random.default_rng(0).random((height, width)).astype(np.float32)
+    planes = stencil.planes([-7.0])
+    stored = lanes(stencil, image)
+    dr.eval(stored)
+    planes.store(stored)
+    padded = np.pad(image, reach, constant_values=-7)
+    window = range(-reach, reach + 1)
+    offsets = [(dy, dx) for dy in window for dx in window]
+    taps = planes.taps(offsets)
+    for t, (dy, dx) in enumerate(offsets):
+        expected = padded[reach + dy:reach + dy + height, reach + dx:reach + dx + width]
+        np.testing.assert_array_equal(stencil.image([taps.at(t)[0] + 0.0 * stencil.opaque(1)]), expected)
+
+
+def test_storing_again_is_seen_by_taps_made_before():
+    stencil = stencil_of(4, 5, 1)
+    planes = stencil.planes([0.0])
+    taps = planes.taps([(0, 1)])
+    for value in (2.0, 3.0):
+        planes.store([stencil.constant(value)])
+        assert stencil.image(taps.at(0))[2].tolist() == [value] * 4 + [0.0]
+
+
+def test_a_tap_beyond_the_reach_is_refused():
+    with pytest.raises(ValueError, match="reach of 2"):
+        stencil_of(4, 5, 2).planes([0.0]).taps([(0, 3)])
+
+
+@pytest.mark.parametrize("components", [1, 3])
+def test_an_image_goes_to_lanes_and_back(components):
+    stencil = stencil_of(7, 11, 3)
+    image = np.random.default_rng(0).random((7, 11, 3)[:2 + (components > 1)]).astype(np.float32)
+    np.testing.assert_array_equal(stencil.image(stencil.load(image)), image)
+
+
+def test_exp2_is_exact_to_8e_5_and_finite_for_any_input():
+    stencil = stencil_of(1, 1, 1)
+    x = np.linspace(-125.9, 0, 100_001).astype(np.float32)
+    result = exp2(stencil.Float(x)).numpy()
+    assert np.abs(result / np.exp2(x.astype(np.float64)) - 1).max() < 8e-5
+    low = exp2(stencil.Float([-127.0, -1e30, float("-inf"), float("nan")])).numpy()
+    assert (low <= 1.2e-38).all()
+
+
+def methods_on(layout, height, width):
+    small = Bilateral(radius=3)
+    for method in (small, Atrous(levels=3), Temporal()):
+        yield method, method.init_on(stencil_of(height, width, method.reach, layout))
+
+
+def test_gathers_and_views_give_the_same():
+    frames = [noisy(make_frame(13, 17, index=i, camera=translation(0.1 * i, 0, 0)), seed=i)
+              for i in range(3)]
+    results = {}
+    for layout in LAYOUTS:
+        for method, state in methods_on(layout, 13, 17):
+            for frame in frames:
+                image, state = method(frame, state)
+            results.setdefault(type(method), []).append(image)
+    for views, gathers in results.values():
+        np.testing.assert_allclose(gathers, views, atol=1e-6)
+
+
+def add(taps: Taps, arrays: list) -> list:
+    return [taps.at(0)[0] + taps.at(1)[0] * 2 + arrays[0] * 4 + arrays[1] * 8]
+
+
+def test_a_step_replays_with_other_memory():
+    stencil = stencil_of(3, 5, 1)
+    planes = stencil.planes([0.0])
+    planes.store([stencil.constant(1)])
+    step = Step(add)
+    taps = planes.taps([(0, 0), (1, 0)])
+    for value in (1.0, 2.0, 3.0):
+        result = step(taps, [stencil.constant(value), stencil.constant(10 * value)])
+        assert stencil.image(result)[0].tolist() == [3 + 84 * value] * 5
+    assert step.recordings == 1
+
+
+@pytest.mark.parametrize("alias_first", [True, False])
+def test_a_step_notices_when_arguments_begin_or_cease_to_be_the_same_array(alias_first):
+    stencil = stencil_of(3, 5, 1)
+    planes = stencil.planes([0.0])
+    planes.store([stencil.constant(1)])
+    step = Step(add)
+    a, b = stencil.constant(5), stencil.constant(7)
+    same, other = planes.taps([(0, 0), (0, 0)]), planes.taps([(0, 0), (1, 0)])
+    calls = [(same, [a, a], 63.0), (other, [a, b], 79.0)]
+    for taps, arrays, expected in (calls if alias_first else calls[::-1]) * 2:
+        assert stencil.image(step(taps, arrays))[0].tolist() == [expected] * 5
+
+
+def test_a_step_records_again_for_another_number_of_lanes():
+    def mean_column(arrays):
+        return [arrays[0] * 0 + dr.width(arrays[0])]  # a width is baked into a recording
+
+    step = Step(mean_column)
+    for width in (5, 9, 5):
+        stencil = stencil_of(2, width, 1)
+        assert step([stencil.constant(1)])[0][0] == stencil.lanes
+    assert step.recordings == 2
+
+
+def test_two_sizes_side_by_side_do_not_disturb_each_other():
+    for method in (AssignmentAtrous(), Assignment(filter=Bilateral(radius=3))):
+        alone, mixed, states = {}, {}, {}
+        for h, w in ((9, 11), (12, 7)):
+            state = method.init(h, w)
+            for i in range(3):
+                alone[h], state = method(noisy(make_frame(h, w, index=i), seed=i), state)
+            states[h] = method.init(h, w)
+        for i in range(3):
+            for h, w in ((9, 11), (12, 7)):
+                mixed[h], states[h] = method(noisy(make_frame(h, w, index=i), seed=i), states[h])
+        for h in alone:
+            np.testing.assert_array_equal(mixed[h], alone[h])
+
+
+def misaligned(image, floats):
+    """The same image in memory that starts some floats after a cache line."""
+    memory = np.empty(image.size + 32, image.dtype)
+    start = (-memory.ctypes.data % 64) // 4 + floats
+    copy = memory[start:start + image.size].reshape(image.shape)
+    copy[...] = image
+    return copy
+
+
+def test_alignment_strides_and_shared_memory_of_the_input_do_not_matter():
+    frame = noisy(make_frame(9, 11))
+    method = AssignmentAtrous()
+
+    def run(*frames):
+        state = method.init(9, 11)
+        for f in frames:
+            image, state = method(f, state)
+        return image, state
+
+    expected, _ = run(frame, frame, frame)
+    kinds = [with_images(frame, **{k: misaligned(v, n) for k, v in frame.images.items()})
+             for n in (0, 1, 5)]
+    kinds[1] = with_images(kinds[1], color=np.asfortranarray(frame["color"]))
+    result, state = run(*kinds)
+    np.testing.assert_array_equal(result, expected)
+    assert state.history.blend.recordings == 1
+    shared = np.repeat(np.full((9, 11, 1), 0.6, np.float32), 3, axis=2)
+    aliased = with_images(frame, color=shared, normal=shared, albedo=shared)
+    apart = with_images(frame, color=shared.copy(), normal=shared.copy(), albedo=shared.copy())
+    np.testing.assert_array_equal(run(aliased, aliased)[0], run(apart, apart)[0])
+
+
+def test_a_frame_may_change_after_it_was_denoised():
+    """Nothing of the frame's memory is read later."""
+    frame = noisy(make_frame(9, 11))
+    method = Temporal()
+    images = {name: image.copy() for name, image in frame.images.items()}
+    first, state = method(with_images(frame, **images), method.init(9, 11))
+    before = first.copy()
+    second, _ = method(frame, state)
+    for image in images.values():
+        image.fill(0)
+    np.testing.assert_array_equal(first, before)
+    again, state = method(frame, method.init(9, 11))
+    np.testing.assert_array_equal(method(frame, state)[0], second)
+
+
+def test_a_second_state_compiles_nothing():
+    frame = noisy(make_frame(9, 11))
+    method = AssignmentAtrous()
+    for f in (frame, frame):
+        method(f, method.init(9, 11))
+    assert compiled(lambda: method(frame, method.init(9, 11))) == 0
+
+
+def test_the_motion_table_grows_with_the_scene():
+    stencil = stencil_of(2, 2, 1)
+    table = np.arange(70 * 32, dtype=np.float32).reshape(70, 32)
+    loaded = load_table(table, stencil).numpy()
+    assert loaded.size == 128 * 32
+    np.testing.assert_array_equal(loaded[:70 * 32], table.ravel())
+    assert np.isnan(loaded[70 * 32:]).all()
+
+
+def test_timed_waits_for_kernels():
+    stencil = stencil_of(64, 64, 1)
+    result, ms = timed(lambda: stencil.image([stencil.constant(2)]))
+    assert result.shape == (64, 64)
+    assert 0 < ms < 60_000
+
+
+@pytest.mark.parametrize(("size", "layout", "words"), [
+    ((0, 5), None, "empty"), ((5, 5), "planar", "layout 'planar'")])
+def test_impossible_grids_are_refused(size, layout, words):
+    with pytest.raises(InputError, match=words):
+        Stencil(*size, 1, "llvm", layout)
