@@ -1,7 +1,11 @@
 """Texture taken out of the colour before filtering, and put back after.
 
-L = (C - E) / max(a, 0.001), with C colour, E emission, a albedo (SVGF, Schied et al. 2017). What
+L = (C - E) / max(a, 0.01), with C colour, E emission, a albedo (SVGF, Schied et al. 2017). What
 is left is light alone, smooth where a texture is not, and a filter cannot blur the texture.
+
+Departures: SVGF's floor is 0.001; a higher one keeps what a dark surface reflects specularly from
+weighing a thousandfold in its neighbours. A surface darker than the floor in all channels (a
+mirror, in renderers that write 0 there) counts as albedo 1.
 """
 
 from __future__ import annotations
@@ -16,7 +20,7 @@ from render.frame import Frame
 from .stencil import Float, Stencil
 
 CHANNELS = ("albedo", "emission")  # used where a frame has them
-SMALLEST_ALBEDO = 1e-3
+SMALLEST_ALBEDO = 1e-2
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,9 @@ def read_texture(frame: Frame, stencil: Stencil, wanted: bool) -> Texture:
         return Texture([], [])
     albedo = stencil.load(np.asarray(frame["albedo"], np.float32))
     albedo = [dr.select(dr.abs(a) < 1e6, a, 1) for a in albedo]
-    albedo = [dr.select(a > SMALLEST_ALBEDO, a, SMALLEST_ALBEDO) for a in albedo]
+    dark = [a < SMALLEST_ALBEDO for a in albedo]
+    floor = dr.select(dark[0] & dark[1] & dark[2], stencil.Float(1), SMALLEST_ALBEDO)
+    albedo = [dr.select(d, floor, a) for d, a in zip(dark, albedo)]
     if "emission" not in frame:
         return Texture(albedo, [])
     emission = stencil.load(np.asarray(frame["emission"], np.float32))

@@ -33,7 +33,7 @@ from render.errors import InputError
 from render.frame import Frame
 
 from .stencil import Float, Stencil
-from .surface import Surface, camera_from_screen, dot, transform
+from .surface import camera_from_screen, dot, transform
 
 LEAST_WEIGHT = 0.01
 WORDS = 8            # a pixel of packed history: colour 3, object ID, normal 3, depth

@@ -18,7 +18,6 @@ scatter would cost five times as much, and in a frozen function it silently writ
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import ModuleType
@@ -79,7 +78,8 @@ class Stencil:
     @property
     def size(self) -> int:
         """Floats in a plane."""
-        return _round_up(self.top + self.lanes + self.reach * self.stride + self.reach, _LINE) + _TAIL
+        below = self.reach * self.stride + self.reach
+        return _round_up(self.top + self.lanes + below, _LINE) + _TAIL
 
     def pixel(self) -> tuple[Any, Any]:
         """(row, column) of each lane as UInt; the gutter repeats the last column."""
@@ -101,7 +101,7 @@ class Stencil:
         return [dr.gather(of_type, flat, start + c) for c in range(components)]
 
     def image(self, arrays: Sequence[Float]) -> np.ndarray:
-        """Arrays of lanes to an (h, w, c) float32 image, (h, w) for one. The image is new memory."""
+        """Arrays of lanes to an (h, w, c) float32 image, (h, w) for one, in new memory."""
         lane = dr.arange(self.UInt, self.lanes)
         row = lane // self.stride
         column = lane - row * self.stride
@@ -264,33 +264,3 @@ class Step:
 def _sizes(*arguments: Any) -> tuple[int, ...]:
     return tuple(a.lanes if isinstance(a, Taps) else dr.width(a[0]) for a in arguments
                  if isinstance(a, Taps) or (isinstance(a, list) and a))
-
-
-# 2^f on [-1/2, 1/2] as a cubic: relative error below 8e-5.
-_EXP2 = (0.99992811, 0.69326099, 0.24261114, 0.05517166)
-_MAGIC = 1.5 * 2**23  # adding it rounds a float to an integer, in the low bits of the sum
-
-
-def exp2(x: Float) -> Float:
-    """2^x for x <= 0 with a relative error below 8e-5; 2^-126 below that, also for -inf and NaN.
-
-    `dr.exp2` costs more than the rest of a tap of a bilateral filter. This is a cubic in the
-    fraction, with the integer part added to the bits of the exponent.
-    """
-    float_t, int_t = type(x), dr.int32_array_t(type(x))
-    x = dr.select(x > -126, x, -126)  # one instruction; dr.maximum's NaN rules cost more
-    rounded = x + _MAGIC
-    f = x - (rounded - _MAGIC)
-    c0, c1, c2, c3 = _EXP2
-    power = dr.fma(dr.fma(dr.fma(f, c3, c2), f, c1), f, c0)
-    exponent = dr.reinterpret_array(int_t, rounded) << 23
-    return dr.reinterpret_array(float_t, dr.reinterpret_array(int_t, power) + exponent)
-
-
-def timed(function: Callable[[], Any]) -> tuple[Any, float]:
-    """(result, milliseconds) of a call, kernels included: they run asynchronously otherwise."""
-    dr.sync_thread()
-    start = time.perf_counter()
-    result = function()
-    dr.sync_thread()
-    return result, 1e3 * (time.perf_counter() - start)

@@ -111,34 +111,43 @@ def read_color(frame: Frame, stencil: Stencil) -> list[Float]:
     return stencil.load(repair(np.asarray(frame["color"], np.float32), frame["id"]))
 
 
-LARGEST = 1e18  # radiance beyond this is taken for a bad pixel: its square would overflow
+LARGEST = 1e18       # radiance beyond this is taken for a bad pixel: its square would overflow
+_REPAIR_RADIUS = 8   # pixels
 
 
 def repair(color: np.ndarray, id_: np.ndarray) -> np.ndarray:
     """Replace each bad pixel by the mean of the good ones around it.
 
     Bad: a component that is not finite, or beyond 1e18. The mean is over pixels of the same
-    object in a 3x3 window, or 5x5, 7x7, and so on until there is one; 0 if the object has none.
+    object in a 3x3 window, or 5x5, 7x7, up to 17x17 until there is one; 0 if there is none.
     A bad pixel so stays one pixel, and no kernel needs to know of it.
     """
-    extreme = np.abs(color).max()  # a NaN comes through, and fails the comparison
-    if extreme <= LARGEST:
+    if -LARGEST <= color.min() and color.max() <= LARGEST:  # false for NaN
         return color
     good = (np.abs(color) <= LARGEST).all(axis=2)
-    repaired = color.copy()
-    for y, x in np.argwhere(~good):
-        repaired[y, x] = _mean_around(color, good & (id_ == id_[y, x]), y, x)
+    repaired = np.where(good[..., None], color, 0)
+    y, x = np.nonzero(~good)
+    for radius in range(1, _REPAIR_RADIUS + 1):
+        total, count = _sums_around(repaired, good, id_, y, x, radius)
+        found = count > 0
+        repaired[y[found], x[found]] = total[found] / count[found, None]
+        y, x = y[~found], x[~found]
     return repaired
 
 
-def _mean_around(color: np.ndarray, usable: np.ndarray, y: int, x: int) -> np.ndarray | float:
-    if not usable.any():
-        return 0.0
-    for radius in range(1, max(usable.shape)):
-        window = (slice(max(y - radius, 0), y + radius + 1), slice(max(x - radius, 0), x + radius + 1))
-        if usable[window].any():
-            return color[window][usable[window]].mean(axis=0)
-    return 0.0
+def _sums_around(color: np.ndarray, good: np.ndarray, id_: np.ndarray, y: np.ndarray, x: np.ndarray,
+                 radius: int) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) sum and (n,) number of good pixels of the same object around pixels (y, x)."""
+    total, count = np.zeros((len(y), 3)), np.zeros(len(y))
+    height, width = good.shape
+    for dy in range(-radius, radius + 1):
+        for dx in range(-radius, radius + 1):
+            inside = (0 <= y + dy) & (y + dy < height) & (0 <= x + dx) & (x + dx < width)
+            there = np.where(inside, y + dy, 0), np.where(inside, x + dx, 0)
+            usable = inside & good[there] & (id_[there] == id_[y, x])
+            total += np.where(usable[:, None], color[there], 0)
+            count += usable
+    return total, count
 
 
 def dot(a: list[Float], b: list[Float]) -> Float:

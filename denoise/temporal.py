@@ -5,6 +5,9 @@ out = alpha C + (1 - alpha) clamp(H, mu - k sigma, mu + k sigma)
 C the current frame's (filtered) colour; H the history where the surface was (`reprojection.py`);
 mu and sigma mean and deviation of C in a window, per channel; alpha = 1 where there is no history.
 
+The window mixes objects, as the assignment has it: with k = 1, a pixel at a corner of one colour
+among another has its history pulled towards the other. A wider box trades that for lag.
+
 The window counts only pixels inside the image, and the variance is about the mean. It is summed
 by rows, then by columns, each row as (count, mean, squares about its own mean), which joined
 (Chan et al. 1983) lose no digits on bright pixels, as E[x^2] - E[x]^2 does.

@@ -123,7 +123,6 @@ class Stage:
                 self._parameters[f"{shape.name}.{key}"] = value
         else:
             to_world = mi.Transform4f(_checked(shape, local).tolist())
-            dr.make_opaque(to_world)  # a literal would be a new kernel every frame
             self._parameters[f"{shape.name}.to_world"] = to_world
 
     def _registry_table(self) -> mi.UInt32:

@@ -7,9 +7,9 @@ import numpy as np
 from scenes.description import Camera, Mesh, Scene, Shape
 from scenes.transforms import look_at, translate
 
-_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 _QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-_INWARD = np.array([t for a, b, c, d in _QUADS for t in ((a, c, b), (a, d, c))])
+INWARD = np.array([t for a, b, c, d in _QUADS for t in ((a, c, b), (a, d, c))])
 
 
 def furnace(albedo: float, emission: float, max_depth: int,
@@ -21,6 +21,6 @@ def furnace(albedo: float, emission: float, max_depth: int,
     wall = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": (albedo,) * 3}}
     camera = look_at(np.add(at, (0.1, 0.2, -0.3)), np.add(at, (0.9, -0.5, 1)))
     return Scene("furnace", "a closed cube of glowing walls",
-                 (Shape("cube", Mesh(_CORNERS, _INWARD), wall, translate(at),
+                 (Shape("cube", Mesh(CORNERS, INWARD), wall, translate(at),
                         (emission,) * 3),),
                  Camera(camera, 70), 4, 16, 16, max_depth)

@@ -55,10 +55,12 @@ def bilateral(frame: Frame, radius: int = 16, sigma_coord: float = 32, sigma_col
             cosine = np.where(both, (p.n * q.n).sum(-1), 1).clip(-1, 1)
             d = q.position - p.position
             distance = np.sqrt((d**2).sum(-1))
-            sine = np.where(both & (distance > 0), (p.n * d).sum(-1) / np.maximum(distance, 1e-30), 0)
+            across = (p.n * d).sum(-1) / np.maximum(distance, 1e-30)
+            sine = np.where(both & (distance > 0), across, 0)
             j = np.exp(-(dy**2 + dx**2) / (2 * sigma_coord**2)
                        - ((p.color - q.color)**2).sum(-1) / (2 * sigma_color**2)
-                       - np.arccos(cosine)**2 / (2 * sigma_normal**2) - sine**2 / (2 * sigma_plane**2))
+                       - np.arccos(cosine)**2 / (2 * sigma_normal**2)
+                       - sine**2 / (2 * sigma_plane**2))
             j = np.where(p.surface == q.surface, j, 0)
             total[where] += j[..., None] * q.color
             weights[where] += j
@@ -76,9 +78,10 @@ def plane_weight_distance(p: Pixels, q: Pixels) -> np.ndarray:
     return np.where(both, distance, np.where(p.surface == q.surface, 0, np.inf))
 
 
-def window_variance(frame: Frame, l: np.ndarray, sigma_plane: float, radius: int = 3) -> np.ndarray:
-    """Variance of l over the window's pixels within sigma_plane of the plane."""
-    pixels, shape = read(frame, l=l), l.shape
+def window_variance(frame: Frame, lum: np.ndarray, sigma_plane: float,
+                    radius: int = 3) -> np.ndarray:
+    """Variance of the luminance over the window's pixels within sigma_plane of the plane."""
+    pixels, shape = read(frame, l=lum), lum.shape
     n, s1, s2 = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     for dy in range(-radius, radius + 1):
         for dx in range(-radius, radius + 1):

@@ -67,6 +67,16 @@ def test_sobol_pairs_put_one_point_in_every_elementary_interval():
         assert len(set(np.floor(np.array(sampler.next_1d()) * n))) == n
 
 
+def test_sobol_numbers_are_uniform_and_independent_over_pixels():
+    n = 1 << 14
+    sampler = Sobol(keys_from_seed(3), mi.UInt32(np.arange(n)), mi.UInt32(0))
+    numbers = np.array([*np.array(sampler.next_2d()), np.array(sampler.next_1d()),
+                        *np.array(sampler.next_2d())])
+    np.testing.assert_allclose(numbers.mean(1), 0.5, atol=5 * (1 / 12 / n) ** 0.5)
+    correlation = np.corrcoef(numbers) - np.eye(len(numbers))
+    assert np.abs(correlation).max() < 5 / n**0.5
+
+
 def test_an_interrupted_reference_goes_on_to_the_same_bytes(tmp_path, monkeypatch):
     job = RenderJob(small_scene(), [0, 1], SIZE, SIZE, reference_spp=32)
     undisturbed = render_sequence(job, tmp_path / "undisturbed")

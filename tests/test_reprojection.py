@@ -26,7 +26,9 @@ MOTIONS = {
     "camera turns": (turn(0.03), np.eye(4)),
     "board moves": (np.eye(4), translation(0.35, 0.2, 0.1)),
     "board turns": (np.eye(4), turn(0.1) @ translation(0, 0.1, 0)),
-    "all move": (translation(0.1, 0.1, 0.2) @ turn(-0.02), translation(-0.3, 0.05, 0.0) @ turn(0.05)),
+    "board turns far": (np.eye(4), translation(0, 0, 6) @ turn(0.7) @ translation(0, 0, -6)),
+    "all move": (translation(0.1, 0.1, 0.2) @ turn(-0.02),
+                 translation(-0.3, 0.05, 0.0) @ turn(0.05)),
 }
 
 
@@ -77,7 +79,7 @@ def test_pure_translation_by_whole_pixels_reprojects_exactly():
 
 
 def test_a_million_units_from_the_origin_reprojects_as_well_as_at_it():
-    camera, board = translation(0.1, 0.1, 0.2) @ turn(-0.02), translation(-0.3, 0.05, 0) @ turn(0.05)
+    camera, board = MOTIONS["all move"]
     results = []
     for origin in ((0, 0, 0), (1e6, -1e6, 1e6)):
         previous = make_frame(23, 30, origin=origin)
@@ -123,6 +125,18 @@ def test_the_plane_and_normal_tests_reject_another_surface_of_the_same_object():
         other = with_images(previous, **{channel: value})
         assert np.isnan(history(other, frame)[tuple(wall)]).all()
         assert np.isfinite(history(other, frame, nearest=True)[tuple(wall)]).all()
+
+
+def test_the_object_test_rejects_another_object_on_the_same_plane():
+    previous, frame = make_frame(20, 24, wall_end=1e9), make_frame(20, 24, index=1, wall_end=1e9)
+    id_ = np.array(previous["id"])
+    id_[:10][id_[:10] == 0] = 1
+    other = with_images(previous, id=id_)
+    wall = (frame["id"] == 0) & (np.arange(20)[:, None] < 10)
+    for nearest in (False, True):
+        result = history(other, frame, nearest=nearest)
+        assert np.isnan(result[wall]).all()
+        assert np.isfinite(result[15:][frame["id"][15:] == 0]).all()
 
 
 def test_an_object_shrunk_to_nothing_has_no_history():

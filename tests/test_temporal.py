@@ -40,7 +40,8 @@ def test_window_moments_count_only_what_is_inside_and_keep_digits(height, width,
     np.testing.assert_allclose(sigma, (high - low) / 2, rtol=5e-3 if offset else 1e-5, atol=1e-6)
 
 
-@pytest.mark.parametrize("parameters", [{}, {"alpha": 0.5}, {"color_box": 0.2}, {"clamp_radius": 1}])
+@pytest.mark.parametrize("parameters",
+                         [{}, {"alpha": 0.5}, {"color_box": 0.2}, {"clamp_radius": 1}])
 def test_two_frames_agree_with_the_formula_in_float64(parameters):
     first = noisy(make_frame(19, 23), seed=1)
     second = noisy(make_frame(19, 23, index=1, camera=translation(0.1, 0, 0.1) @ turn(0.02),
