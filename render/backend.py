@@ -81,9 +81,26 @@ def find_llvm() -> LLVM | None:
 
 
 def prepare() -> None:
-    """Point Dr.Jit at a usable LLVM. Call before the first import of drjit; cheap, idempotent."""
+    """Point Dr.Jit at a usable LLVM. Call before the first import of drjit; cheap, idempotent.
+
+    Raises:
+        InputError: Dr.Jit was imported before and has loaded an LLVM that it would crash with.
+    """
+    if "drjit" in sys.modules and (loaded := _loaded_llvm()) and not loaded.usable:
+        raise InputError(f"drjit was imported first and has loaded the LLVM at {loaded.path}, with "
+                         "which it would crash: import render or denoise before drjit and mitsuba")
     if _SET_BY_USER is None and (llvm := find_llvm()) and llvm.usable:
         os.environ["DRJIT_LIBLLVM_PATH"] = llvm.path
+
+
+def _loaded_llvm() -> LLVM | None:
+    """The libLLVM in this process, where the system can tell (Linux)."""
+    try:
+        lines = Path("/proc/self/maps").read_text().splitlines()
+    except OSError:
+        return None
+    paths = {line.split(maxsplit=5)[5] for line in lines if "libLLVM" in line}
+    return next((LLVM(path, llvm_version(path)) for path in sorted(paths)), None)
 
 
 def require_llvm() -> LLVM:

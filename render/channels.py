@@ -48,6 +48,10 @@ _ROWS = (
             "light from emitters scattered once, at the first hit; not demodulated"),
     Channel("indirect", _rgb("indirect"), False, 0.0,
             "light scattered twice or more; not demodulated"),
+    Channel("unshadowed", _rgb("unshadowed"), False, 0.0,
+            "direct light as if nothing cast a shadow, noise-free (`--direct resampled` only)"),
+    Channel("visibility", ("visibility",), False, 0.0,
+            "share of `unshadowed` that arrives, one noisy sample, may exceed 1 (likewise)"),
     Channel("albedo", _rgb("albedo"), True, 0.0,
             "diffuse reflectance in [0, 1]; 1 where the surface has no diffuse part"),
     Channel("normal", ("N.X", "N.Y", "N.Z"), False, 0.0,
@@ -65,6 +69,7 @@ _ROWS = (
 CHANNELS = MappingProxyType({row.name: row for row in _ROWS})
 
 RADIANCE = ("color", "emission", "direct", "indirect")
+SPLIT = ("unshadowed", "visibility")
 GBUFFER = ("albedo", "normal", "position", "depth", "id")
 FRAME = RADIANCE + GBUFFER
 REFERENCE = ("color", "variance")

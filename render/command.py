@@ -11,7 +11,7 @@ from scenes import catalog
 
 from . import backend
 from .arguments import parse_size
-from .channels import FRAME
+from .channels import FRAME, SPLIT
 from .errors import InputError
 from .manifest import parse_frames
 from .sequence import Sequence
@@ -44,8 +44,15 @@ def render_options(command):
                      help="Also render ground truth with N samples a pixel."),
         click.option("--antialias", is_flag=True,
                      help="Box-filter the reference over each pixel instead of its centre."),
-        click.option("--channels", metavar="NAMES", default=",".join(FRAME),
-                     help=f"What frames carry, of {', '.join(FRAME)}; default all."),
+        click.option("--channels", metavar="NAMES",
+                     help=f"What frames carry, of {', '.join((*FRAME, *SPLIT))}; default all."),
+        click.option("--direct", default="mis", show_default=True,
+                     type=click.Choice(["mis", "resampled"]),
+                     help="Direct light at the first hit; resampled adds its split into "
+                          "unshadowed light and visibility."),
+        click.option("--sampler", default="pcg", show_default=True,
+                     type=click.Choice(["pcg", "zsobol"]),
+                     help="Random numbers: independent, or with blue-noise error."),
         click.option("--overwrite", is_flag=True, help="Replace another sequence in the folder."),
         device_option, threads_option,
     )):
@@ -69,18 +76,19 @@ def render(scene: str, out: Path | None, device: str, threads: int | None, **opt
 
 
 def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: str | None, seed: int,
-              reference_spp: int | None, antialias: bool, channels: str,
-              overwrite: bool) -> Sequence:
+              reference_spp: int | None, antialias: bool, channels: str | None,
+              direct: str, sampler: str, overwrite: bool) -> Sequence:
     """Do what the options of a command ask."""
     scene = catalog.load(scene_name)
     height, width = parse_size(size) if size else (scene.height, scene.width)
     numbers = parse_frames(frames) if frames else tuple(range(scene.frames))
     if seed < 0:
         raise InputError(f"--seed is {seed}: use 0 or more")
-    names = _channel_names(channels)
+    names = _channel_names(channels, (*FRAME, *SPLIT) if direct == "resampled" else FRAME)
     from .job import RenderJob, render_sequence  # imports Mitsuba
 
-    job = RenderJob(scene, numbers, height, width, seed, reference_spp, antialias, names)
+    job = RenderJob(scene, numbers, height, width, seed, reference_spp, antialias, names,
+                    direct, sampler)
     with progress() as begin:
         rendering = begin(f"render {scene.name} {width}x{height}", len(numbers))
         refining = begin(f"reference, {reference_spp} spp", len(numbers)) if reference_spp else None
@@ -93,13 +101,15 @@ def _ignore(done: float, note: str) -> None:
     pass
 
 
-def _channel_names(text: str) -> tuple[str, ...]:
+def _channel_names(text: str | None, offered: tuple[str, ...]) -> tuple[str, ...]:
+    if text is None:
+        return offered
     names = [name.strip() for name in text.split(",") if name.strip()]
-    unknown = [name for name in names if name not in FRAME]
+    unknown = [name for name in names if name not in offered]
     if unknown or not names:
         raise InputError(f"--channels names {unknown[0] if unknown else 'nothing'}: "
-                         f"use some of {', '.join(FRAME)}")
-    return tuple(name for name in FRAME if name in names)
+                         f"use some of {', '.join(offered)}")
+    return tuple(name for name in offered if name in names)
 
 
 FORMATS = click.option("--format", "layout", type=click.Choice(["games202"]), default="games202",

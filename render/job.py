@@ -39,6 +39,8 @@ class RenderJob:
         reference_spp: samples a pixel of the reference, None for none.
         antialias: the reference is box-filtered over each pixel instead of through its centre.
         channels: what each frame carries, see `render/channels.py`.
+        direct, sampler: the estimator of direct light and the random numbers of the frames, see
+            `render/renderer.py`. (References are always MIS and Sobol.)
     """
 
     scene: Scene
@@ -49,6 +51,8 @@ class RenderJob:
     reference_spp: int | None = None
     antialias: bool = False
     channels: Sequence[str] = FRAME
+    direct: str = "mis"
+    sampler: str = "pcg"
 
     def manifest(self) -> Manifest:
         return checked(
@@ -56,6 +60,7 @@ class RenderJob:
             scene=self.scene.name, about=self.scene.about, fingerprint=fingerprint(self.scene),
             frames=tuple(self.frames), width=self.width, height=self.height, fps=self.scene.fps,
             seed=self.seed, reference_spp=self.reference_spp, max_depth=self.scene.max_depth,
+            direct=self.direct, sampler=self.sampler,
             reference_filter="box" if self.antialias else "centre",
             channels=tuple(self.channels), objects=self.scene.object_names,
             device=backend.choose(), versions=versions(),
@@ -89,12 +94,14 @@ def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
 
     def ready() -> Renderer:  # a complete folder needs no scene
         nonlocal renderer
-        renderer = renderer or Renderer(job.scene, job.height, job.width)
+        renderer = renderer or Renderer(job.scene, job.height, job.width, direct=job.direct,
+                                        sampler=job.sampler)
         return renderer
 
     provenance = {"software": f"onespp {versions()['onespp']}", "scene": job.scene.name,
                   "sceneFingerprint": sequence.manifest.fingerprint, "seed": str(job.seed),
-                  "maxDepth": str(job.scene.max_depth)}
+                  "maxDepth": str(job.scene.max_depth), "direct": job.direct,
+                  "sampler": job.sampler}
     for done, index in enumerate(job.frames, 1):
         if not sequence.has_frame(index):
             frame = ready().frame(index, job.seed, tuple(job.channels))

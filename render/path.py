@@ -14,33 +14,42 @@ from dataclasses import dataclass
 
 import drjit as dr
 
+from .lights import DirectLight, resample_lights
+from .mis import power_heuristic
 from .sampler import Sampler
 from .variant import mi
 
 
 @dataclass
 class Radiance:
-    """Radiance toward the camera, linear, by scattering events: none, one, more."""
+    """Radiance toward the camera, linear, by scattering events: none, one, more.
+
+    `unshadowed` and `visibility` split direct light, if it was resampled: see `render/lights.py`.
+    """
 
     emission: mi.Color3f
     direct: mi.Color3f
     indirect: mi.Color3f
+    unshadowed: mi.Color3f | None = None
+    visibility: mi.Float | None = None
 
 
 @dr.syntax
 def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
-          max_depth: int) -> Radiance:
+          max_depth: int, resampled: bool = False) -> Radiance:
     """One path a lane.
 
     Args:
         scene: what to trace. ray: camera rays. pi: their first hits.
         sampler: random numbers, advanced by the call.
         max_depth: longest path in segments, as in Mitsuba (1: emission, 2: direct light).
+        resampled: direct light at the first hit by resampling instead of by MIS.
     """
     context = mi.BSDFContext()
     ray = mi.Ray3f(ray)
     pi = mi.PreliminaryIntersection3f(pi)
     emission, direct, indirect = mi.Color3f(0), mi.Color3f(0), mi.Color3f(0)
+    arrived = mi.Color3f(0)  # direct light, but for what purely specular lobes reflect
     beta = mi.Color3f(1)
     depth = mi.UInt32(0)
     previous_p = mi.Point3f(0)
@@ -48,7 +57,15 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     from_delta = mi.Bool(True)
     active = mi.Bool(True)
 
-    while dr.hint(active, max_iterations=max_depth, label="path"):
+    split = None
+    if dr.hint(resampled and max_depth > 1, mode="scalar"):
+        first = pi.compute_surface_interaction(ray)
+        smooth = first.is_valid() & mi.has_flag(first.bsdf().flags(), mi.BSDFFlags.Smooth)
+        split = resample_lights(scene, first, sampler, smooth)
+        direct += split.direct
+        arrived += split.direct
+
+    while dr.hint(active, exclude=[split], max_iterations=max_depth, label="path"):
         si = pi.compute_surface_interaction(ray)
         bsdf = si.bsdf(ray)
 
@@ -62,6 +79,9 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         # Light that this vertex looks for: one shadow ray.
         inner = si.is_valid() & (depth + 1 < max_depth)
         smooth = inner & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        if dr.hint(resampled, mode="scalar"):
+            smooth &= depth > 0
+            arrived += dr.select((depth == 1) & ~from_delta, found, 0)
         light, light_weight = scene.sample_emitter_direction(si, sampler.next_2d(), True, smooth)
         lit = smooth & (light.pdf != 0)
         bsdf_value, p, bsdf_sample, bsdf_weight = bsdf.eval_pdf_sample(
@@ -82,13 +102,13 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         depth += 1
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
 
-    return Radiance(emission, direct, indirect)
+    return _radiance(emission, direct, indirect, arrived, split)
 
 
-def power_heuristic(p: mi.Float, q: mi.Float) -> mi.Float:
-    """Power heuristic weight of a sample drawn with density p where q could have drawn it too.
-
-    Source: Veach 1997, section 9.2.2, exponent 2. Infinite or zero densities give 1 or 0.
-    """
-    w = dr.square(p) / (dr.square(p) + dr.square(q))
-    return dr.select(p > 0, dr.select(dr.isfinite(w), w, 1), 0)
+def _radiance(emission: mi.Color3f, direct: mi.Color3f, indirect: mi.Color3f,
+              arrived: mi.Color3f, split: DirectLight | None) -> Radiance:
+    if split is None:
+        return Radiance(emission, direct, indirect)
+    possible = mi.luminance(split.unshadowed)
+    visibility = dr.select(possible > 0, mi.luminance(arrived) / possible, 0)
+    return Radiance(emission, direct, indirect, split.unshadowed, visibility)

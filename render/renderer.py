@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import drjit as dr
@@ -10,15 +10,31 @@ import numpy as np
 
 from scenes.description import Scene
 
-from .channels import FRAME, RADIANCE
+from .channels import FRAME, RADIANCE, SPLIT
 from .errors import InputError
 from .frame import Frame
 from .gbuffer import GBUFFER, PrimaryHit
 from .path import trace
 from .rays import camera_matrices, pixel_rays
-from .sampler import FRAME_STREAM, REFERENCE_STREAM, Pcg, Sobol, keys_from_seed
+from .sampler import (
+    FRAME_STREAM,
+    REFERENCE_STREAM,
+    Keys,
+    Pcg,
+    Sampler,
+    Sobol,
+    keys_from_seed,
+    z_order,
+)
 from .stage import Stage
 from .variant import mi
+
+DIRECT = ("mis", "resampled")
+SAMPLERS: dict[str, Callable[[Keys, Any, int], Sampler]] = {
+    "pcg": lambda keys, pixel, width: Pcg(keys, pixel),
+    "zsobol": lambda keys, pixel, width: Sobol(keys, mi.UInt32(0),
+                                               z_order(pixel % width, pixel // width)),
+}
 
 
 class Renderer:
@@ -29,7 +45,12 @@ class Renderer:
         SceneError: a scene that Mitsuba cannot build.
     """
 
-    def __init__(self, scene: Scene, height: int, width: int) -> None:
+    def __init__(self, scene: Scene, height: int, width: int, *, direct: str = "mis",
+                 sampler: str = "pcg") -> None:
+        for option, value, known in (("direct", direct, DIRECT), ("sampler", sampler, SAMPLERS)):
+            if value not in known:
+                raise InputError(f"unknown --{option} '{value}': use {' or '.join(known)}")
+        self.direct, self.sampler = direct, sampler
         if height < 1 or width < 1:
             raise InputError(f"the size {width}x{height} is empty: use at least 1x1")
         self.scene, self.height, self.width = scene, height, width
@@ -40,6 +61,8 @@ class Renderer:
 
         The result depends on (scene, index, seed, size) alone.
         """
+        if self.direct != "resampled" and set(channels) & set(SPLIT):
+            raise InputError(f"the channels {' and '.join(SPLIT)} need --direct resampled")
         self.stage.pose(index)
         planes = self._trace_frame(index, seed, channels)
         dr.eval(planes)
@@ -73,14 +96,18 @@ class Renderer:
             ray, depth_per_length = rays.at(*self._centres(pixel))
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
             planes = {}
-            if set(channels) & set(RADIANCE):
-                sampler = Pcg(keys_from_seed(seed, FRAME_STREAM, index), pixel)
-                radiance = trace(scene, ray, pi, sampler, self.scene.max_depth)
+            if set(channels) & {*RADIANCE, *SPLIT}:
+                keys = keys_from_seed(seed, FRAME_STREAM, index)
+                sampler = SAMPLERS[self.sampler](keys, pixel, self.width)
+                radiance = trace(scene, ray, pi, sampler, self.scene.max_depth,
+                                 self.direct == "resampled")
                 planes = {
                     "color": radiance.emission + radiance.direct + radiance.indirect,
                     "emission": radiance.emission,
                     "direct": radiance.direct,
                     "indirect": radiance.indirect,
+                    "unshadowed": radiance.unshadowed,
+                    "visibility": radiance.visibility,
                 }
             if set(channels) & set(GBUFFER):
                 hit = PrimaryHit(self.stage, pi.compute_surface_interaction(ray), depth_per_length)

@@ -104,6 +104,29 @@ class Sobol:
         return a, b, a ^ dr.brev(b)
 
 
+def z_order(x: mi.UInt32, y: mi.UInt32) -> mi.UInt32:
+    """Position of a pixel on the Z-order curve (Morton code): the bits of x and y interleaved.
+
+    With this as its index and one seed for all pixels, `Sobol` gives the pixels of every aligned
+    power-of-two block of the curve one well-stratified set, so that the error of an image moves
+    to high frequencies, which filters remove.
+
+    Source: Ahmed and Wonka 2020, "Screen-space blue-noise diffusion of Monte Carlo sampling error
+    via hierarchical ordering of pixels". Differs: the order inside a block is scrambled bit by bit
+    (Owen's in base 2) instead of by permutations of quadrants.
+    """
+    return _spread(x) | (_spread(y) << 1)
+
+
+def _spread(bits: mi.UInt32) -> mi.UInt32:
+    """The lower 16 bits, a zero before each."""
+    bits = bits & 0xFFFF
+    bits = (bits | (bits << 8)) & 0x00FF00FF
+    bits = (bits | (bits << 4)) & 0x0F0F0F0F
+    bits = (bits | (bits << 2)) & 0x33333333
+    return (bits | (bits << 1)) & 0x55555555
+
+
 def _owen(bits: mi.UInt32, seed: mi.UInt32) -> mi.UInt32:
     """Owen scrambling of a fraction: each bit is flipped by a hash of those above it."""
     return dr.brev(_hash_upward(dr.brev(bits), seed))

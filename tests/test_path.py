@@ -37,7 +37,7 @@ def test_furnace_far_from_the_origin_looks_the_same():
 def test_samples_have_the_mean_of_mitsubas_path(name):
     """Box-filtered, since Mitsuba jitters its camera rays."""
     scene = furnace(ALBEDO, EMISSION, DEPTH) if name == "furnace" else catalog.load(name)
-    height, width, frame, spp, replicates = 24, 32, 7, 16, 64
+    height, width, frame, spp, replicates = 16, 24, 7, 16, 64
     renderer = Renderer(scene, height, width)
     ours = [renderer.sample_sum(frame, 0, k, spp, antialias=True) / spp
             for k in range(replicates)]
@@ -49,12 +49,15 @@ def test_samples_have_the_mean_of_mitsubas_path(name):
     assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
 
 
-@pytest.mark.parametrize("name", ["box", "room"])
-def test_frames_at_one_sample_have_the_mean_of_the_reference(name):
+@pytest.mark.parametrize(("name", "direct", "sampler"), [
+    ("box", "mis", "pcg"), ("box", "mis", "zsobol"), ("box", "resampled", "pcg"),
+    ("room", "mis", "pcg"), ("room", "resampled", "zsobol"), ("furnace", "resampled", "zsobol")])
+def test_frames_at_one_sample_have_the_mean_of_the_reference(name, direct, sampler):
     height, width, frame = 16, 20, 3
-    renderer = Renderer(catalog.load(name), height, width)
-    ours = [renderer.frame(frame, seed, ("color",))["color"] for seed in range(300)]
-    reference = [renderer.sample_sum(frame, 9, k, 16) / 16 for k in range(64)]
+    scene = furnace(ALBEDO, EMISSION, DEPTH) if name == "furnace" else catalog.load(name)
+    renderer = Renderer(scene, height, width, direct=direct, sampler=sampler)
+    ours = [renderer.frame(frame, seed, ("color",))["color"] for seed in range(160)]
+    reference = [renderer.sample_sum(frame, 9, k, 16) / 16 for k in range(32)]
     a, b = ([blocks(image, 2) for image in images] for images in (ours, reference))
     assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
 
