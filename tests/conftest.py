@@ -19,3 +19,8 @@ def games202() -> Path:
     if not folder.is_dir():
         pytest.skip("the GAMES202 box frames are not in ../shared/data/games202-box")
     return folder
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--regenerate", action="store_true",
+                     help="render the golden images anew instead of comparing with them")

@@ -1,0 +1,60 @@
+"""Small renders against stored means and variances.
+
+`pytest tests/test_goldens.py --regenerate` renders the goldens anew: look at the difference, say in
+the commit why the images changed. A failure leaves both images in a folder that it names.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from z_test import assert_same_mean
+
+from denoise.tonemap import bytes_from_linear
+from render.reference import Progress
+from render.renderer import Renderer
+from scenes import catalog
+
+GOLDENS = Path(__file__).parent / "goldens"
+HEIGHT, WIDTH, GOLDEN_SPP, SPP = 24, 32, 2048, 256
+
+
+def estimate(name: str, frame: int, seed: int, spp: int) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and variance of the mean, (h, w, 3); 32 passes, so that the variance is known well."""
+    renderer = Renderer(catalog.load(name), HEIGHT, WIDTH)
+    progress = Progress.start(HEIGHT, WIDTH)
+    for number in range(32):
+        size = spp // 32
+        progress.add(renderer.sample_sum(frame, seed, number, size), size)
+    reference = progress.reference()
+    return reference.color, reference.variance
+
+
+def blocks_of(mean: np.ndarray, variance: np.ndarray, size: int = 4):
+    """Mean of blocks and its variance: pixels are independent."""
+    shape = (HEIGHT // size, size, WIDTH // size, size, 3)
+    return (mean.reshape(shape).mean((1, 3), dtype=np.float64),
+            variance.reshape(shape).sum((1, 3), dtype=np.float64) / size**4)
+
+
+@pytest.mark.parametrize(("name", "frame"), [("box", 0), ("box", 13), ("room", 0), ("room", 47)])
+def test_renders_match_their_goldens(name, frame, request, tmp_path):
+    path = GOLDENS / f"{name}_{frame:04d}.npz"
+    if request.config.getoption("--regenerate"):
+        mean, variance = estimate(name, frame, 1, GOLDEN_SPP)
+        GOLDENS.mkdir(exist_ok=True)
+        np.savez_compressed(path, mean=mean, variance=variance)
+        pytest.skip(f"regenerated {path.name}")
+    golden = np.load(path)
+    mean, variance = estimate(name, frame, 0, SPP)
+    try:
+        assert_same_mean(*blocks_of(mean, variance),
+                         *blocks_of(golden["mean"], golden["variance"]))
+    except AssertionError as failure:
+        both = np.concatenate([golden["mean"], mean], axis=1)
+        Image.fromarray(bytes_from_linear(both)).resize((16 * WIDTH, 8 * HEIGHT), 0).save(
+            tmp_path / "golden_and_render.png")
+        raise AssertionError(f"{failure}; see {tmp_path}/golden_and_render.png") from None
