@@ -8,7 +8,17 @@ from pathlib import Path
 import click
 
 import render.command
-from denoise.command import DEFAULT_METHODS, denoise, denoise_in, score, score_in
+from denoise.bench_command import bench
+from denoise.command import (
+    DEFAULT_METHODS,
+    compare,
+    denoise,
+    denoise_in,
+    report,
+    score,
+    score_in,
+    time_,
+)
 from render.terminal import BAD_INPUT
 from render.terminal import run as run_command
 
@@ -64,8 +74,8 @@ def doctor() -> None:
         sys.exit(BAD_INPUT)
 
 
-for command in (render.command.render, denoise, score, render.command.import_,
-                render.command.export):
+for command in (render.command.render, denoise, time_, score, report, compare, bench,
+                render.command.import_, render.command.export):
     app.add_command(command)
 
 

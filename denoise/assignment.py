@@ -6,16 +6,15 @@ Order: filter, reproject, clamp the history to the filtered frame's statistics, 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
-
-import numpy as np
+from typing import Any
 
 from render.frame import Frame
 
 from .atrous import Atrous
 from .bilateral import Bilateral
-from .stencil import Stencil
-from .surface import GUIDES, read_color, read_surface
+from .lanes import OnLanes
+from .stencil import Float, Stencil
+from .surface import Surface
 from .temporal import Temporal, TemporalState
 
 
@@ -23,34 +22,29 @@ from .temporal import Temporal, TemporalState
 class FilteredState:
     """State of the filter and of the accumulation, on one stencil."""
 
+    stencil: Stencil
     filter: Any
     history: TemporalState
 
 
-class _Filtered:
+class _Filtered(OnLanes):
     """Filter, then accumulate: what both variants share."""
-
-    needs: ClassVar[tuple[str, ...]] = ("color", *GUIDES)
 
     filter: Bilateral | Atrous
     history: Temporal
 
-    def init(self, height: int, width: int) -> FilteredState:
-        stencil = Stencil(height, width, max(self.filter.reach, self.history.reach))
-        return FilteredState(self.filter.init_on(stencil), self.history.init_on(stencil))
+    @property
+    def reach(self) -> int:
+        return max(self.filter.reach, self.history.reach)
 
-    def __call__(self, frame: Frame, state: FilteredState) -> tuple[np.ndarray, FilteredState]:
-        """(h, w, 3) denoised colour, and the state for the next frame.
+    def init_on(self, stencil: Stencil) -> FilteredState:
+        return FilteredState(stencil, self.filter.init_on(stencil), self.history.init_on(stencil))
 
-        Raises:
-            InputError: a channel is missing, the size is not the state's, or the frame has
-                other objects than the one before it.
-        """
-        stencil = state.history.stencil
-        color, surface = read_color(frame, stencil), read_surface(frame, stencil)
-        filtered = self.filter.filter(frame, color, surface, state.filter)
-        result, history = self.history.accumulate(frame, filtered, surface, state.history)
-        return stencil.image(result), replace(state, history=history)
+    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
+                 state: FilteredState) -> tuple[list[Float], FilteredState]:
+        filtered, _ = self.filter.on_lanes(frame, color, surface, state.filter)
+        result, history = self.history.on_lanes(frame, filtered, surface, state.history)
+        return result, replace(state, history=history)
 
 
 @dataclass(frozen=True)

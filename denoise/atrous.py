@@ -22,25 +22,28 @@ Departures from SVGF:
 - x^128 = exp(-128 (t + t^2 / 2)), t = 1 - x: within 1e-3 of the largest weight.
 - Two pixels without a surface have full geometry weights; one with, one without: 0.
 - Only pixels inside the image count.
+
+Form: kernels filter (r, l, b) instead of (r, g, b), so that no tap computes its luminance; g comes
+out of the three at the end, with an error of 1e-7 times the brightest of them.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import drjit as dr
-import numpy as np
 
 from render.errors import InputError
 from render.frame import Frame
 
 from .demodulation import read_texture
 from .exponential import exp2
+from .lanes import OnLanes
 from .parameters import check_positive
 from .stencil import Float, Stencil, Step, Taps
-from .surface import GUIDES, Surface, luminance, read_color, read_surface
+from .surface import LUMINANCE, Surface, luminance
 
 LOG2E = 1.4426950408889634
 SPLINE = {0: 3 / 8, 1: 1 / 4, 2: 1 / 16}
@@ -59,7 +62,7 @@ def _window(radius: int) -> list[tuple[int, int]]:
 
 
 @dataclass(frozen=True)
-class Atrous:
+class Atrous(OnLanes):
     """A-trous filter of each frame by itself.
 
     Attributes:
@@ -68,8 +71,6 @@ class Atrous:
         normal_power: exponent of the cosine between normals.
         demodulate: filter colour over albedo, where the frame has albedo.
     """
-
-    needs: ClassVar[tuple[str, ...]] = ("color", *GUIDES)
 
     levels: int = 5
     sigma_luminance: float = 4.0
@@ -87,20 +88,7 @@ class Atrous:
     def reach(self) -> int:
         return max(2 << (self.levels - 1), VARIANCE_RADIUS)
 
-    def init(self, height: int, width: int) -> AtrousState:
-        return self.init_on(Stencil(height, width, self.reach))
-
-    def __call__(self, frame: Frame, state: AtrousState) -> tuple[np.ndarray, AtrousState]:
-        """(h, w, 3) filtered colour of a frame.
-
-        Raises:
-            InputError: a channel is missing, or the size is not the state's.
-        """
-        color, surface = read_color(frame, state.stencil), read_surface(frame, state.stencil)
-        return state.stencil.image(self.filter(frame, color, surface, state)), state
-
     def init_on(self, stencil: Stencil) -> AtrousState:
-        """State on a stencil that reaches at least `reach` pixels."""
         signal, guides = stencil.planes([0.0] * 4), stencil.planes([0.0] * 3 + [_OUTSIDE])
         level_taps = []
         for i in range(self.levels):
@@ -113,9 +101,8 @@ class Atrous:
             Step(estimate_variance), [Step(luminance_scale) for _ in range(self.levels)],
             [Step(filter_level) for _ in range(self.levels)])
 
-    def filter(self, frame: Frame, color: list[Float], surface: Surface,
-               state: AtrousState) -> list[Float]:
-        """Filtered colour of a frame, as arrays of lanes."""
+    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
+                 state: AtrousState) -> tuple[list[Float], AtrousState]:
         stencil = state.stencil
         texture = read_texture(frame, stencil, self.demodulate)
         light = texture.remove(color)
@@ -125,11 +112,11 @@ class Atrous:
         scale = dr.select(surface.exists, dr.abs(surface.plane_distance)
                           * stencil.opaque(1 / self.sigma_plane), float_t(_BACKGROUND_SCALE))
         guides = [*normal, inverse_depth, *surface.plane, scale]
-        lum = luminance(light)
-        dr.eval(light, guides, lum)
+        light = [light[0], luminance(light), light[2]]
+        dr.eval(light, guides)
         state.guides.store(guides[:4])
-        state.signal.store([*light, lum])  # l in the place of the variance until there is one
-        variance = state.variance_step(*state.variance_taps, [lum], guides)
+        state.signal.store(light)
+        variance = state.variance_step(*state.variance_taps, light[1:2], guides)
         numbers = [stencil.opaque(EPSILON), stencil.opaque(self.sigma_luminance / LOG2E),
                    stencil.opaque(LOG2E * self.normal_power)]
         signal = [*light, variance]
@@ -138,12 +125,12 @@ class Atrous:
             scale_of_l = state.scale_steps[i](state.blur_taps, signal[3:], numbers)
             signal = state.level_steps[i](*state.level_taps[i], signal, guides,
                                           [scale_of_l], [state.spacings[i], numbers[2]])
-        return texture.restore(signal[:3])
+        return texture.restore(with_green(signal)), state
 
 
 @dataclass(frozen=True)
 class AtrousState:
-    """Planes of the signal (colour 3, variance) and of the guides (n, 1/z), and their taps."""
+    """Planes of the signal (r, l, b, variance) and of the guides (n, 1/z), and their taps."""
 
     stencil: Stencil
     signal: Any
@@ -169,7 +156,7 @@ def estimate_variance(signal: Taps, guides: Taps, center: list[Float],
     for i, (dy, dx) in enumerate(_window(VARIANCE_RADIUS)):
         expected = dr.fma(gx, float(dx), dr.fma(gy, float(dy), inverse_depth))
         on_plane = dr.abs(guides.at(i)[3] - expected) * scale < 1
-        d = dr.select(on_plane, signal.at(i)[3] - lum, 0)
+        d = dr.select(on_plane, signal.at(i)[1] - lum, 0)
         count += dr.select(on_plane, float_t(1), 0)
         sum1, sum2 = sum1 + d, dr.fma(d, d, sum2)
         signal.next()
@@ -189,28 +176,34 @@ def luminance_scale(taps: Taps, variance: list[Float], numbers: list[Float]) -> 
 
 def filter_level(signal: Taps, guides: Taps, center: list[Float], center_guides: list[Float],
                  scale_of_l: list[Float], numbers: list[Float]) -> list[Float]:
-    """One level: filtered colour (3) and variance. numbers: spacing, log2(e) normal_power."""
+    """One level: filtered r, l, b and variance. numbers: spacing, log2(e) normal_power."""
     nx, ny, nz, inverse_depth, gx, gy, scale = center_guides
     spacing, power = numbers
     half_power = power * 0.5
     gx, gy = gx * spacing, gy * spacing
-    lum, lum_scale = luminance(center[:3]), scale_of_l[0]
+    lum, lum_scale = center[1], scale_of_l[0]
     h0 = SPLINE[0]**2
     total = type(lum)(h0)
-    r, g, b, v = [c * h0 for c in center[:3]] + [center[3] * h0**2]
+    r, y, b, v = [c * h0 for c in center[:3]] + [center[3] * h0**2]
     for i, (dy, dx) in enumerate(_window(2)):
-        tr, tg, tb, tv = signal.at(i)
+        tr, ty, tb, tv = signal.at(i)
         tnx, tny, tnz, tap_inverse_depth = guides.at(i)
         t = dr.fma(-nx, tnx, dr.fma(-ny, tny, dr.fma(-nz, tnz, 1)))
         expected = dr.fma(gx, float(dx), dr.fma(gy, float(dy), inverse_depth))
         log2_h = math.log2(SPLINE[abs(dy)] * SPLINE[abs(dx)])
         e = dr.fma(-t, dr.fma(t, half_power, power), log2_h)
         e = dr.fma(dr.abs(tap_inverse_depth - expected), -scale, e)
-        e = dr.fma(dr.abs(luminance([tr, tg, tb]) - lum), -lum_scale, e)
+        e = dr.fma(dr.abs(ty - lum), -lum_scale, e)
         w = exp2(e)
-        r, g, b, total = dr.fma(w, tr, r), dr.fma(w, tg, g), dr.fma(w, tb, b), total + w
+        r, y, b, total = dr.fma(w, tr, r), dr.fma(w, ty, y), dr.fma(w, tb, b), total + w
         v = dr.fma(w * w, tv, v)
-        if i % 2:  # two taps at a time: 20 % faster than one
-            signal.next()
+        signal.next()
     norm = 1 / total
-    return [r * norm, g * norm, b * norm, v * norm * norm]
+    return [r * norm, y * norm, b * norm, v * norm * norm]
+
+
+def with_green(signal: list[Float]) -> list[Float]:
+    """(r, g, b) of (r, luminance, b, ...)."""
+    r, y, b, *_ = signal
+    red, green, blue = LUMINANCE
+    return [r, dr.fma(r, -red / green, dr.fma(b, -blue / green, y * (1 / green))), b]

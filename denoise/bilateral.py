@@ -18,30 +18,31 @@ into one exponent of 2. acos^2(1 - t) is t times a quadratic, exact to 2e-4 for 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
 import drjit as dr
-import numpy as np
 
 from render.frame import Frame
 
 from .demodulation import read_texture
 from .exponential import exp2
+from .lanes import OnLanes
 from .parameters import check_positive, check_radius
-from .stencil import Float, Stencil, Step, Taps
-from .surface import GUIDES, Surface, read_color, read_surface
+from .stencil import Float, Planes, Stencil, Step, Taps
+from .surface import Surface
 
 LOG2E = 1.4426950408889634
 # acos^2(1 - t) / t on [0, 1], relative error below 0.0026 (t + 0.02); beyond, it only grows.
 ACOS2 = (2.00009996, 0.32205101, 0.13894848)
-_OUTSIDE = 1e19   # colour outside the image: far from any other, so that its weight is 0
+_FAR = 1e19       # colour outside the image: far from any other, so that its weight is 0
+OUTSIDE = [_FAR] * 3 + [0.0] * 7  # what the planes hold there: colour 3, normal 3, kind, position 3
 _KIND = 4.0       # fourth component of a normal: + surface, - none; its product tells them apart
 _TINY = 1e-30     # |Pj - Pi|^2 of a pixel and itself
 
 
 @dataclass(frozen=True)
-class Bilateral:
+class Bilateral(OnLanes):
     """Joint bilateral filter of each frame by itself.
 
     Attributes:
@@ -52,8 +53,6 @@ class Bilateral:
         isolate_background: a pixel without a surface takes from its like alone. Otherwise it takes
             from all (its normal and plane terms are 0), as in the assignment's solutions.
     """
-
-    needs: ClassVar[tuple[str, ...]] = ("color", *GUIDES)
 
     radius: int = 16
     sigma_coord: float = 32.0
@@ -71,49 +70,49 @@ class Bilateral:
     def reach(self) -> int:
         return self.radius
 
-    def init(self, height: int, width: int) -> BilateralState:
-        return self.init_on(Stencil(height, width, self.reach))
-
-    def __call__(self, frame: Frame, state: BilateralState) -> tuple[np.ndarray, BilateralState]:
-        """(h, w, 3) filtered colour of a frame.
-
-        Raises:
-            InputError: a channel is missing, or the size is not the state's.
-        """
-        color, surface = read_color(frame, state.stencil), read_surface(frame, state.stencil)
-        return state.stencil.image(self.filter(frame, color, surface, state)), state
-
     def init_on(self, stencil: Stencil) -> BilateralState:
-        """State on a stencil that reaches at least `radius` pixels."""
-        planes = stencil.planes([_OUTSIDE] * 3 + [0.0] * 7)
+        planes = stencil.planes(OUTSIDE)
         window = range(-self.radius, self.radius + 1)
         rows = [planes.taps([(dy, dx) for dx in window]) for dy in window]
         squares = [stencil.opaque(dy * dy) for dy in window]
         return BilateralState(stencil, planes, rows, squares, Step(add_row_of_taps))
 
-    def filter(self, frame: Frame, color: list[Float], surface: Surface,
-               state: BilateralState) -> list[Float]:
-        """Filtered colour of a frame, as arrays of lanes."""
+    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
+                 state: BilateralState) -> tuple[list[Float], BilateralState]:
         stencil = state.stencil
         texture = read_texture(frame, stencil, self.demodulate)
-        scale = np.sqrt(LOG2E / 2) / self.sigma_color
-        k = stencil.opaque(scale)
+        center, weights = self.prepare(texture.remove(color), surface, state.planes)
+        sums = [stencil.constant(0) for _ in range(4)]
+        for taps, square in zip(state.rows, state.squares, strict=True):
+            sums = state.step(taps, center, sums, [*weights, square])
+        return texture.restore(self.mean(sums, stencil)), state
+
+    def prepare(self, light: list[Float], surface: Surface,
+                planes: Planes) -> tuple[list[Float], list[Float]]:
+        """Fill the planes; `center` and `weights` of `add_row_of_taps`, these without dy^2."""
+        stencil = planes.stencil
+        k = stencil.opaque(self.color_scale)
         kind = dr.select(surface.exists, stencil.Float(_KIND), -_KIND)
-        pixels = [c * k for c in texture.remove(color)] + surface.normal + [kind] + surface.position
+        pixels = [c * k for c in light] + surface.normal + [kind] + surface.position
         own_kind = dr.select(surface.exists, stencil.Float(_KIND), -_KIND * self.isolate_background)
         self_product = dr.fma(own_kind, own_kind, dr.select(surface.exists, stencil.Float(1), 0))
         dr.eval(pixels, own_kind, self_product)
-        state.planes.store(pixels)
-        center = [*pixels[:6], own_kind, *pixels[7:], self_product]
+        planes.store(pixels)
         half_log2e = LOG2E / 2
         weights = ([stencil.opaque(-half_log2e / self.sigma_coord**2)]
                    + [stencil.opaque(-half_log2e / self.sigma_normal**2 * a) for a in ACOS2]
                    + [stencil.opaque(-half_log2e / self.sigma_plane**2)])
-        sums = [stencil.constant(0) for _ in range(4)]
-        for taps, square in zip(state.rows, state.squares, strict=True):
-            sums = state.step(taps, center, sums, [*weights, square])
-        total = 1 / (sums[3] * k)
-        return texture.restore([s * total for s in sums[:3]])
+        return [*pixels[:6], own_kind, *pixels[7:], self_product], weights
+
+    @property
+    def color_scale(self) -> float:
+        """Of colours in the planes, so that the square of a difference is its exponent of 2."""
+        return math.sqrt(LOG2E / 2) / self.sigma_color
+
+    def mean(self, sums: list[Float], stencil: Stencil) -> list[Float]:
+        """Colour from the sums of w times scaled colour, and of w."""
+        norm = 1 / (sums[3] * stencil.opaque(self.color_scale))
+        return [s * norm for s in sums[:3]]
 
 
 @dataclass(frozen=True)
@@ -121,7 +120,7 @@ class BilateralState:
     """Planes (colour 3, normal 3, kind, position 3) and their taps, a row of the window each."""
 
     stencil: Stencil
-    planes: Any
+    planes: Planes
     rows: list[Taps]
     squares: list[Float]
     step: Step

@@ -26,5 +26,6 @@ def exp2(x: Float) -> Float:
     f = x - (rounded - _MAGIC)
     c0, c1, c2, c3 = _EXP2
     power = dr.fma(dr.fma(dr.fma(f, c3, c2), f, c1), f, c0)
-    exponent = dr.reinterpret_array(int_t, rounded) << 23
+    integer: Any = dr.reinterpret_array(int_t, rounded)
+    exponent = integer << 23  # to where a float keeps its exponent; the rest falls out
     return dr.reinterpret_array(float_t, dr.reinterpret_array(int_t, power) + exponent)

@@ -24,6 +24,8 @@ from render.frame import Frame
 from .assignment import Assignment, AssignmentAtrous
 from .atrous import Atrous
 from .bilateral import Bilateral
+from .peers import PEERS
+from .separable import BilateralSeparable
 from .temporal import Temporal
 
 
@@ -47,6 +49,7 @@ class Method(Protocol):
 
 METHODS: Mapping[str, type] = MappingProxyType({
     "bilateral": Bilateral,
+    "bilateral-separable": BilateralSeparable,
     "atrous": Atrous,
     "temporal": Temporal,
     "assignment": Assignment,
@@ -57,13 +60,15 @@ METHODS: Mapping[str, type] = MappingProxyType({
 def build(name: str, settings: Mapping[str, str] | None = None) -> Method:
     """A method by name, with some parameters given as text: `build("bilateral", {"radius": "8"})`.
 
+    The name is one of `METHODS` or `PEERS`.
+
     Raises:
         InputError: no such method or parameter (the message lists them), or a value that does
             not read as the parameter's type or is out of its range.
     """
-    if name not in METHODS:
-        raise InputError(f"unknown method '{name}': use {', '.join(METHODS)}")
-    method = METHODS[name]()
+    if name not in METHODS and name not in PEERS:
+        raise InputError(f"unknown method '{name}': use {', '.join((*METHODS, *PEERS))}")
+    method = METHODS[name]() if name in METHODS else PEERS[name].make()
     known = parameters(method)
     typed = {}
     for key, text in (settings or {}).items():
@@ -74,9 +79,9 @@ def build(name: str, settings: Mapping[str, str] | None = None) -> Method:
     return _replace(method, typed)
 
 
-def parameters(method: Any) -> dict[str, bool | int | float]:
+def parameters(method: Any) -> dict[str, bool | int | float | str]:
     """Parameter name -> value, those of a method's parts included."""
-    found: dict[str, bool | int | float] = {}
+    found: dict[str, bool | int | float | str] = {}
     for f in fields(method):
         value = getattr(method, f.name)
         found.update(parameters(value) if is_dataclass(value) else {f.name: value})
@@ -98,7 +103,7 @@ _WORDS = {"true": True, "yes": True, "on": True, "1": True,
           "false": False, "no": False, "off": False, "0": False}
 
 
-def _parse(key: str, text: str, kind: type) -> bool | int | float:
+def _parse(key: str, text: str, kind: type) -> bool | int | float | str:
     try:
         return _WORDS[text.strip().lower()] if kind is bool else kind(text)
     except (KeyError, ValueError):

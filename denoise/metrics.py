@@ -7,19 +7,21 @@ pixels and colours alike, in float64. A row says in which space its function tak
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 
+from . import flip
+from .ssim import ssim
 from .tonemap import srgb_from_linear
 
 PSNR_CAP = 150.0
 """dB of identical images, whose PSNR is infinite. A float32 image with values up to 1 is itself
 uncertain by 144 dB, so nothing real reaches it, and means, files and plots stay finite."""
 
-RELMSE_FLOOR = 0.01
+RELMSE_FLOOR = SMAPE_FLOOR = 0.01
 
 
 def mse(a: np.ndarray, b: np.ndarray) -> float:
@@ -43,28 +45,38 @@ def relmse(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.mean((a - b) ** 2 / (b ** 2 + RELMSE_FLOOR)))
 
 
+def smape(a: np.ndarray, b: np.ndarray) -> float:
+    """mean(|a - b| / (|a| + |b| + 0.01)), linear, in [0, 1] (Vogels et al. 2018)."""
+    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    return float(np.mean(np.abs(a - b) / (np.abs(a) + np.abs(b) + SMAPE_FLOOR)))
+
+
 @dataclass(frozen=True)
 class Metric:
-    """One measure.
+    """One measure of a frame.
 
     Attributes:
         name: key in scores.json and column in scores.csv.
         label: heading in tables; `unit` goes with it ("" where there is none).
-        function: (a, b) -> float, finite for finite images.
-        space: "linear" or "srgb", what `function` takes.
+        function: (a, b) -> float, finite for finite images; None where it does not apply.
+        space: "linear" or "srgb", what `function` takes; "step": see `stability.py`.
         higher_is_better: the direction.
         format: how tables print it.
         about: the definition in a line.
+        in_table: whether it has a column on the terminal; the files have them all.
+        most_frames: it is slow, and measured on that many frames, spread evenly; None: on all.
     """
 
     name: str
     label: str
-    function: Callable[[np.ndarray, np.ndarray], float]
+    function: Callable[..., float | None]
     space: str
     unit: str
     higher_is_better: bool
     format: str
     about: str
+    in_table: bool = True
+    most_frames: int | None = None
 
 
 _ROWS = (
@@ -73,9 +85,22 @@ _ROWS = (
            f"at most {PSNR_CAP:g}; a sequence's is the mean over its frames"),
     Metric("relmse", "relMSE", relmse, "linear", "", False, ".4f",
            "mean((a - b)^2 / (b^2 + 0.01)), linear; a sequence's is the mean over its frames"),
+    Metric("smape", "SMAPE", smape, "linear", "", False, ".4f",
+           "mean(|a - b| / (|a| + |b| + 0.01)), linear", in_table=False),
+    Metric("ssim", "SSIM", ssim, "srgb", "", True, ".4f",
+           "structural similarity, Gaussian of 1.5 pixels, mean over colours, on clipped sRGB"),
+)
+_FLIP_ROWS = (
+    Metric("flip", "FLIP", flip.flip, "srgb", "", False, ".4f",
+           "mean LDR-FLIP at 67 pixels per degree, on clipped sRGB; "
+           "on at most 8 frames, spread evenly", most_frames=8),
+    Metric("flip_hdr", "HDR-FLIP", flip.hdr_flip, "linear", "", False, ".4f",
+           "mean HDR-FLIP (ACES), linear, where a reference exceeds 1; "
+           "on at most 2 frames, spread evenly", in_table=False, most_frames=2),
 )
 
-METRICS = MappingProxyType({row.name: row for row in _ROWS})
+METRICS = MappingProxyType({
+    row.name: row for row in (*_ROWS, *(_FLIP_ROWS if flip.AVAILABLE else ()))})
 
 HEADLINE = METRICS["psnr_srgb"]
 
@@ -90,21 +115,45 @@ def non_finite(image: np.ndarray) -> np.ndarray:
     return np.logical_not(np.isfinite(image).all(axis=-1))
 
 
-def measure(image: np.ndarray, reference: np.ndarray) -> dict[str, float]:
-    """Every row of `METRICS` for one frame.
+@dataclass(frozen=True)
+class Pair:
+    """An image and its reference, fit for the measures: `linear` and `srgb` are both (a, b)."""
 
-    A non-finite pixel of `image` is scored as black. Where `reference` is not finite, neither is
+    linear: tuple[np.ndarray, np.ndarray]
+    srgb: tuple[np.ndarray, np.ndarray]
+
+
+def pair(image: np.ndarray, reference: np.ndarray) -> Pair:
+    """Two (h, w, 3) images of linear radiance, to be compared.
+
+    A non-finite pixel of `image` is judged as black. Where `reference` is not finite, neither is
     judged (black in both).
-
-    Args:
-        image, reference: (h, w, 3) linear radiance.
-    Returns:
-        metric name -> value, always finite.
     """
     unknown = non_finite(reference)
-    a, b = blacken(image, non_finite(image) | unknown), blacken(reference, unknown)
-    spaces = {"linear": (a, b), "srgb": (srgb_from_linear(a), srgb_from_linear(b))}
-    return {m.name: m.function(*spaces[m.space]) for m in METRICS.values()}
+    linear = blacken(image, non_finite(image) | unknown), blacken(reference, unknown)
+    return Pair(linear, (srgb_from_linear(linear[0]), srgb_from_linear(linear[1])))
+
+
+def measure(image: np.ndarray, reference: np.ndarray) -> dict[str, float | None]:
+    """Every row of `METRICS` for one frame: name -> value, finite, or None if it doesn't apply.
+
+    Args:
+        image, reference: (h, w, 3) linear radiance, repaired as by `pair`.
+    """
+    return measure_pair(pair(image, reference), METRICS)
+
+
+def measure_pair(images: Pair, names: Iterable[str]) -> dict[str, float | None]:
+    """The named rows of `METRICS`."""
+    rows = [METRICS[name] for name in names]
+    return {row.name: row.function(*getattr(images, row.space)) for row in rows}
+
+
+def spread(frames: list[int], count: int | None) -> list[int]:
+    """At most `count` of the frames: first, last, and evenly between; None: all."""
+    if count is None or len(frames) <= count:
+        return frames
+    return [frames[i] for i in np.linspace(0, len(frames) - 1, count).round().astype(int)]
 
 
 def reference_floor(reference: np.ndarray, variance: np.ndarray, nodes: int = 5) -> float:

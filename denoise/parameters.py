@@ -28,3 +28,10 @@ def check_radius(denoiser: Any, name: str, largest: int = 64) -> None:
     value = getattr(denoiser, name)
     if not isinstance(value, int) or not 1 <= value <= largest:
         raise InputError(f"{name} is {value}: use a whole number from 1 to {largest}")
+
+
+def check_choice(denoiser: Any, name: str, choices: tuple[str, ...]) -> None:
+    """InputError unless the field is one of the choices."""
+    value = getattr(denoiser, name)
+    if value not in choices:
+        raise InputError(f"{name} is '{value}': use {', '.join(choices)}")

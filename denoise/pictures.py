@@ -15,7 +15,7 @@ from PIL import Image
 from render.atomic import replacing
 from render.sequence import Sequence
 
-from .metrics import HEADLINE, blacken, non_finite
+from .metrics import HEADLINE, blacken, non_finite, spread
 from .movie import MovieError, write_movie
 from .panels import GAP, error_legend, error_picture, panel, resize, scaled_size, tile
 from .plot import plot_speed_against_error
@@ -39,7 +39,7 @@ def draw_pictures(sequence: Sequence, scores: Scores, movie_methods: list[str] |
         one sentence for each picture that could not be made.
     """
     folder = sequence.folder / "pictures"
-    chosen = _spread(scores.frames, SHEETS)
+    chosen = spread(scores.frames, SHEETS)
     sheets = {frame: folder / f"sheet_{frame:04d}.png" for frame in chosen}
     total = len(chosen) + len(scores.frames) + 1
     tell = progress or (lambda done, total, what: None)
@@ -144,9 +144,3 @@ def _images(sequence: Sequence, scores: Scores, frame: int,
         floor = scores.reference_floor_per_frame.get(frame)
         cap = "" if floor is None else f", noise floor {floor:.1f} {HEADLINE.unit}"
         yield "reference", f"{reference.spp} spp{cap}", reference.color
-
-
-def _spread(frames: list[int], count: int) -> list[int]:
-    """At most `count` of the frames: first, last, and evenly between."""
-    picks = np.linspace(0, len(frames) - 1, min(count, len(frames))).round().astype(int)
-    return [frames[i] for i in picks]

@@ -1,31 +1,38 @@
 """Scores a sequence: the input and every method present, against the reference.
 
-Streams: one frame of one method is in memory at a time, next to its reference. The number of a
-sequence is the mean of its frames' (for PSNR too: not the PSNR of the pooled squared error, which
-the worst frame would dominate).
+Streams: two frames in a row of each method are in memory at a time. The number of a sequence is
+the mean of its frames' (for PSNR too: not the PSNR of the pooled squared error, which the worst
+frame would dominate).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from statistics import fmean, median
+from itertools import pairwise
+from statistics import fmean
+from typing import Any
 
 import numpy as np
 
 from render.atomic import write_text
 from render.errors import InputError
-from render.manifest import Run
 from render.sequence import Reference, Sequence
 
-from .metrics import METRICS, measure, non_finite, reference_floor
+from .bias import split_errors
+from .cost import cost
+from .ground import read_ground
+from .interleave import read_times
+from .judge import Judge
+from .metrics import METRICS, reference_floor, spread
 from .pictures import Progress, draw_pictures
-from .scorecard import INPUT, FrameScore, MethodScore, Scores
+from .scorecard import INPUT, MethodScore, Scores
+from .stability import MEASURES
 from .tonemap import TONE_MAP
 
 
 def score(sequence: Sequence, methods: list[str] | None = None, pictures: bool = True,
-          progress: Progress | None = None) -> Scores:
+          progress: Progress | None = None, seeds: list[Sequence] | None = None) -> Scores:
     """Score a sequence, and write scores.json, scores.csv and `pictures/` into its folder.
 
     Without a reference everything but the error is reported; a method with results for some
@@ -35,11 +42,18 @@ def score(sequence: Sequence, methods: list[str] | None = None, pictures: bool =
         methods: which to score beside the input; default: all that have results.
         pictures: also draw contact sheets, the movie and the plot.
         progress: called with (done, total, what).
+        seeds: renders of the same with other seeds, to split errors by (`bias.py`).
 
     Raises:
-        InputError: an unknown method, no frames, or a file that cannot be read or written.
+        InputError: an unknown method, no frames, a file that cannot be read or written, or
+            `seeds` that are of something else.
     """
     scores = measure_sequence(sequence, methods, progress)
+    if seeds:
+        splits = split_errors([sequence, *seeds], list(scores.methods))
+        scores = scores.model_copy(update={"methods": {
+            name: method.model_copy(update={"split": splits.get(name)})
+            for name, method in scores.methods.items()}})
     write_text(sequence.folder / "scores.json", scores.json_text())
     write_text(sequence.folder / "scores.csv", scores.csv_text())
     if pictures:
@@ -57,24 +71,34 @@ def measure_sequence(sequence: Sequence, methods: list[str] | None = None,
     if not frames:
         raise InputError(f"{sequence.folder} has no frames yet: render some first")
     runs = {name: sequence.read_run(name) for name in names}
-    rows: dict[str, list[FrameScore]] = {name: [] for name in (INPUT, *names)}
+    judges = {name: Judge() for name in (INPUT, *names)}
+    chosen = _chosen(sequence, frames)
     known: dict[int, _Known] = {}
-    for n, frame in enumerate(frames):
-        reference = None
-        if sequence.has_reference(frame):
-            reference = sequence.read_reference(frame)
-            known[frame] = _Known(reference.spp, _floor(reference))
-        truth = reference and reference.color
-        color = sequence.read_frame(frame, ("color",))["color"]
-        rows[INPUT].append(_score_frame(frame, color, truth, None))
+    ground, after = None, {b: a for a, b in pairwise(sequence.frames)}
+    for n, number in enumerate(frames):
+        before = after.get(number)
+        here = ground if n and frames[n - 1] == before else None
+        ground, frame = read_ground(sequence, number, here)
+        if ground.reference is not None:
+            known[number] = _Known(ground.reference.spp, _floor(ground.reference))
+        metrics = [name for name in METRICS if number in chosen[name]]
+        judges[INPUT].see(number, before, frame["color"], ground, None, metrics)
         for name in names:
-            if sequence.has_result(name, frame):
-                rows[name].append(_score_frame(frame, sequence.read_result(name, frame), truth,
-                                               runs[name].ms.get(frame)))
+            if sequence.has_result(name, number):
+                judges[name].see(number, before, sequence.read_result(name, number), ground,
+                                 runs[name].ms.get(number), metrics)
         if progress:
             progress(n + 1, len(frames), "score")
-    methods_scored = {name: _summary(rows[name], runs.get(name)) for name in rows}
+    times = read_times(sequence.folder)
+    methods_scored = {name: _summary(judge, cost(sequence, runs.get(name), times))
+                      for name, judge in judges.items()}
     return _scores(sequence, frames, known, methods_scored)
+
+
+def _chosen(sequence: Sequence, frames: list[int]) -> dict[str, list[int]]:
+    """Metric -> the frames that it is measured on."""
+    judged = [i for i in frames if sequence.has_reference(i)]
+    return {row.name: spread(judged, row.most_frames) for row in METRICS.values()}
 
 
 @dataclass(frozen=True)
@@ -97,15 +121,6 @@ def _methods(sequence: Sequence, wanted: list[str] | None) -> list[str]:
     return [name for name in dict.fromkeys(wanted) if name != INPUT]
 
 
-def _score_frame(frame: int, image: np.ndarray, reference: np.ndarray | None,
-                 ms: float | None) -> FrameScore:
-    values: dict[str, float | None] = dict.fromkeys(METRICS)
-    bad = int(non_finite(image).sum())
-    if reference is not None:
-        values.update(measure(image, reference))
-    return FrameScore(frame=frame, ms=ms, non_finite_pixels=bad, **values)  # pyright: ignore
-
-
 def _floor(reference: Reference) -> float | None:
     """None where the variance isn't known (a reference of one sample, or from elsewhere)."""
     if not np.isfinite(reference.variance).any():
@@ -119,16 +134,13 @@ def _mean(values: Iterable[float | None]) -> float | None:
     return fmean(measured) if measured else None
 
 
-def _summary(rows: list[FrameScore], run: Run | None) -> MethodScore:
-    """Means over frames; the time leaves out the first frame, in which kernels compile."""
-    warm = [row.ms for row in rows[1:] if row.ms is not None]
-    run = run or Run(method=INPUT)
+def _summary(judge: Judge, spent: dict[str, Any]) -> MethodScore:
+    rows = judge.rows
+    means: dict[str, Any] = {name: _mean(row[name] for row in rows) for name in MEASURES}
     return MethodScore(
-        ms_per_frame=median(warm) if warm else None, first_ms=run.first_ms,
-        non_finite_pixels=sum(row.non_finite_pixels for row in rows),
-        device=run.device, threads=run.threads, parameters=run.parameters, versions=run.versions,
-        per_frame=rows,
-        **{name: _mean(row[name] for row in rows) for name in METRICS})  # pyright: ignore
+        **spent, non_finite_pixels=sum(row.non_finite_pixels for row in rows),
+        by_cause=judge.causes.scores(), by_history=judge.histories.scores(), per_frame=rows,
+        **means)
 
 
 def _scores(sequence: Sequence, frames: list[int], known: dict[int, _Known],
@@ -157,6 +169,9 @@ def _notes(wanted: tuple[int, ...], frames: list[int], known: dict[int, _Known],
     if len({k.spp for k in known.values()}) > 1:
         yield (f"References have {min(k.spp for k in known.values())} to "
                f"{max(k.spp for k in known.values())} samples a pixel.")
+    timed = [name for name, method in methods.items() if method.interleaved]
+    if timed:
+        yield f"Times of {', '.join(timed)} were measured in turns (`onespp time`)."
     for name, method in methods.items():
         if len(method.per_frame) < len(frames):
             yield (f"{name} has {len(method.per_frame)} of {len(frames)} frames; its numbers are "

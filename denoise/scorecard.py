@@ -1,7 +1,7 @@
 """What scores.json and scores.csv hold, and reading it back.
 
 `Scores` is the JSON file as it stands: strict JSON, so a number that was not measured (no
-reference, no time) is null, and nothing is ever NaN or infinite. The values of `METRICS` stand
+reference, no time) is null, and nothing is ever NaN or infinite. The values of `MEASURES` stand
 beside the declared fields, under their names: `scores.methods["input"]["psnr_srgb"]`.
 """
 
@@ -12,11 +12,11 @@ import io
 from pathlib import Path
 from typing import Any
 
-from pydantic import ConfigDict, FiniteFloat, model_serializer
+from pydantic import ConfigDict, Field, FiniteFloat, model_serializer
 
 from render.json_file import JsonFile, format_json, read_json
 
-from .metrics import METRICS
+from .stability import MEASURES
 
 INPUT = "input"
 """The method that does nothing: the noisy frames themselves."""
@@ -45,23 +45,59 @@ class FrameScore(Measured):
     non_finite_pixels: int
 
 
+class ClassScore(JsonFile):
+    """A method's error on the pixels of one class, pooled over frames.
+
+    Attributes:
+        pixels: share of all pixels. mse_share: share of the method's squared error.
+        psnr_srgb: dB of the mean squared error in the class; null if it has no pixels.
+    """
+
+    pixels: FiniteFloat
+    mse_share: FiniteFloat
+    psnr_srgb: FiniteFloat | None
+
+
+class ErrorSplit(JsonFile):
+    """Bias and variance of display values over renders with other seeds (`bias.py`)."""
+
+    renders: int
+    frames: int
+    mse: FiniteFloat
+    bias_squared: FiniteFloat
+    variance: FiniteFloat
+
+
 class MethodScore(Measured):
-    """One method over the sequence; its metrics are means over `per_frame`.
+    """One method over the sequence; its measures are means over `per_frame`.
 
     Attributes:
         ms_per_frame: median over the frames after the first. first_ms: the first, which
-            includes compiling. Both null for the input.
+            includes compiling. Both null for the input. `interleaved`: the median is that of
+            `onespp time`, measured in turns with other methods.
+        startup_ms: what the first three frames took beyond that median each: compiling, loading.
+        megapixels_per_s: pixels over that median. peak_mb: of `Run`.
         non_finite_pixels: sum over frames; such pixels were scored as black.
         device, threads, parameters, versions: of the run that made the results.
+        by_cause, by_history: error by `classes.CAUSES` and `HISTORIES`, over the frames that
+            have a frame before them; empty without reference or guides.
+        split: bias and variance, where other seeds were given.
     """
 
     ms_per_frame: FiniteFloat | None
     first_ms: FiniteFloat | None
+    startup_ms: FiniteFloat | None = None
+    megapixels_per_s: FiniteFloat | None = None
+    peak_mb: FiniteFloat | None = None
+    interleaved: bool = False
     non_finite_pixels: int
     device: str
     threads: int | None
     parameters: dict[str, Any]
     versions: dict[str, str]
+    by_cause: dict[str, ClassScore] = Field(default_factory=dict)
+    by_history: dict[str, ClassScore] = Field(default_factory=dict)
+    split: ErrorSplit | None = None
     per_frame: list[FrameScore]
 
 
@@ -110,11 +146,11 @@ class Scores(JsonFile):
         """One row for each method and frame."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(["method", "frame", *METRICS, "ms", "reference_floor_db",
+        writer.writerow(["method", "frame", *MEASURES, "ms", "reference_floor_db",
                          "non_finite_pixels"])
         for name, method in self.methods.items():
             for row in method.per_frame:
-                writer.writerow([name, row.frame, *(row[m] for m in METRICS), row.ms,
+                writer.writerow([name, row.frame, *(row[m] for m in MEASURES), row.ms,
                                  self.reference_floor_per_frame.get(row.frame),
                                  row.non_finite_pixels])
         return text.getvalue()

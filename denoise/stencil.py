@@ -131,15 +131,14 @@ class Stencil:
 
 
 def _spread(least: int) -> int:
-    """Smallest stride from `least` on at which rows 16 or fewer apart fall into different sets.
+    """Smallest stride from `least` on that is an odd number of cache lines.
 
-    With 5 rows of taps in each of 8 planes, a stride such as 544 makes all of them share a few
-    sets of the cache, and a kernel four times slower.
+    Taps straight above and below are then as aligned as the pixel itself, and rows a power of two
+    apart fall into different sets of the cache. With an even number (as in 544 floats) all rows of
+    taps in all planes share a few sets, and a kernel is four times slower.
     """
-    def crowded(stride: int) -> bool:
-        return any(min(m * stride % _SETS, -m * stride % _SETS) < 8 for m in (1, 2, 3, 4))
-
-    return next(stride for stride in range(least, least + _SETS) if not crowded(stride))
+    lines = -(-least // _LINE)
+    return _LINE * (lines + 1 - lines % 2)
 
 
 def _module(device: str) -> ModuleType:
@@ -165,19 +164,18 @@ class Planes:
                 self._arrays.append(dr.opaque(stencil.Float, float(value), stencil.size))
 
     def store(self, arrays: Sequence[Float]) -> None:
-        """Copy evaluated arrays of lanes into the planes; their gutters are left out."""
+        """Copy evaluated arrays of lanes into the first planes; their gutters are left out."""
         s = self.stencil
         if s.layout == "gather":
             lane = dr.arange(s.UInt, s.lanes)
             inside = lane % s.stride < s.width
-            for plane, array in zip(self._arrays, arrays, strict=True):
+            for plane, array in zip(self._arrays, arrays):
                 dr.scatter(plane, array, lane + s.top, inside)
             dr.eval(self._arrays)
             return
-        for memory, array in zip(self._memory, arrays, strict=True):
-            rows = memory[s.top:s.top + s.lanes].view(np.uint16).reshape(s.height, 2 * s.stride)
-            values = array.numpy().view(np.uint16).reshape(s.height, 2 * s.stride)
-            np.copyto(rows[:, :2 * s.width], values[:, :2 * s.width])  # floats here are misaligned
+        for memory, array in zip(self._memory, arrays):
+            rows = memory[s.top:s.top + s.lanes].reshape(s.height, s.stride)
+            np.copyto(rows[:, :s.width], array.numpy().reshape(rows.shape)[:, :s.width])
 
     def taps(self, offsets: Sequence[Offset]) -> Taps:
         """The planes seen from the neighbours at offsets (dy, dx)."""
@@ -202,14 +200,14 @@ class Planes:
 
 
 def _allocate(size: int, value: float, index: int) -> np.ndarray:
-    """Float32 memory that starts two bytes after a cache line, each plane's in another set.
+    """Float32 memory that starts at a cache line, each plane's in another set.
 
-    A view at a multiple of 64 bytes is another kernel and another recording to Dr.Jit than one
-    that is not. Two bytes off, no view is at one; vector loads don't mind.
+    A load across two lines costs twice as much. Since rows are whole lines too, whether a tap is
+    at one depends on its dx alone; a tap that is, is another kernel to Dr.Jit than one that is not.
     """
     memory = np.empty(4 * (size + 2 * _SETS * _LINE), np.uint8)
     page = -memory.ctypes.data % (4 * _SETS * _LINE)
-    start = page + 4 * _LINE * (index * 13 % _SETS) + 2
+    start = page + 4 * _LINE * (index * 13 % _SETS)
     floats = memory[start:start + 4 * size].view(np.float32)
     floats.fill(value)
     return floats

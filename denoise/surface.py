@@ -24,6 +24,7 @@ from render.frame import Frame
 from .stencil import Float, Stencil
 
 GUIDES = ("normal", "depth", "id")
+LUMINANCE = (0.2126, 0.7152, 0.0722)
 _FARTHEST = 1e15  # a greater depth counts as background: its square would overflow
 
 
@@ -122,9 +123,9 @@ def repair(color: np.ndarray, id_: np.ndarray) -> np.ndarray:
     object in a 3x3 window, or 5x5, 7x7, up to 17x17 until there is one; 0 if there is none.
     A bad pixel so stays one pixel, and no kernel needs to know of it.
     """
-    if -LARGEST <= color.min() and color.max() <= LARGEST:  # false for NaN
+    if color.min() >= -LARGEST and color.max() <= LARGEST:  # false for NaN
         return color
-    good = (np.abs(color) <= LARGEST).all(axis=2)
+    good = np.asarray((np.abs(color) <= LARGEST).all(axis=2))
     repaired = np.where(good[..., None], color, 0)
     y, x = np.nonzero(~good)
     for radius in range(1, _REPAIR_RADIUS + 1):
@@ -142,8 +143,9 @@ def _sums_around(color: np.ndarray, good: np.ndarray, id_: np.ndarray, y: np.nda
     height, width = good.shape
     for dy in range(-radius, radius + 1):
         for dx in range(-radius, radius + 1):
-            inside = (0 <= y + dy) & (y + dy < height) & (0 <= x + dx) & (x + dx < width)
-            there = np.where(inside, y + dy, 0), np.where(inside, x + dx, 0)
+            ty, tx = y + dy, x + dx
+            inside = (ty >= 0) & (ty < height) & (tx >= 0) & (tx < width)
+            there = np.where(inside, ty, 0), np.where(inside, tx, 0)
             usable = inside & good[there] & (id_[there] == id_[y, x])
             total += np.where(usable[:, None], color[there], 0)
             count += usable
@@ -164,4 +166,5 @@ def _opaque(stencil: Stencil, matrix: np.ndarray) -> list[list[Float]]:
 
 def luminance(color: list[Float]) -> Float:
     """Relative luminance of linear Rec. 709 radiance."""
-    return dr.fma(color[0], 0.2126, dr.fma(color[1], 0.7152, color[2] * 0.0722))
+    red, green, blue = LUMINANCE
+    return dr.fma(color[0], red, dr.fma(color[1], green, color[2] * blue))

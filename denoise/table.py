@@ -7,10 +7,14 @@ import sys
 from rich.console import Console
 from rich.table import Table
 
-from .metrics import HEADLINE, METRICS, Metric
+from .classes import CAUSES, HISTORIES
+from .metrics import HEADLINE, Metric
 from .scorecard import INPUT, MethodScore, Scores
+from .stability import MEASURES
 
 PLAIN_WIDTH = 100
+
+_COLUMNS = [row for row in MEASURES.values() if row.in_table]
 
 
 def print_scores(scores: Scores, console: Console | None = None) -> None:
@@ -39,16 +43,53 @@ def table(scores: Scores) -> Table:
 def cells(scores: Scores, name: str) -> dict[str, str]:
     """Column heading -> text, for one method."""
     method = scores.methods[name]
-    width, height = scores.size
-    row = {_heading(m): _number(method[m.name], m.format) for m in METRICS.values()}
+    row = {_heading(m): _number(method[m.name], m.format) for m in _COLUMNS}
     gain = None if name == INPUT else _gain(scores, method)
     row[f"gain ({HEADLINE.unit})"] = _number(gain, "+.2f")
-    ms = method.ms_per_frame
-    row["ms/frame"] = _number(ms, ".1f")
-    row["Mpix/s"] = _number(width * height / ms / 1e3 if ms else None, ".1f")
+    row["ms/frame"] = _number(method.ms_per_frame, ".1f")
     if any(len(m.per_frame) < len(scores.frames) for m in scores.methods.values()):
         row["frames"] = f"{len(method.per_frame)}/{len(scores.frames)}"
     return row
+
+
+def print_classes(scores: Scores, console: Console | None = None) -> None:
+    """Error by cause and by length of history: dB in the class, share of the squared error."""
+    console = console or Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
+    for title, names in (("cause", CAUSES), ("history", HISTORIES)):
+        field = f"by_{title}"
+        classes = {name: getattr(scores.methods[name], field) for name in scores.ordered()}
+        shown = [c for c in names if any(c in k and k[c].pixels for k in classes.values())]
+        if not shown:
+            console.print(f"There is no error by {title}: it takes references, and frames with "
+                          "normal, depth and id.", style="yellow", highlight=False)
+            continue
+        grid = Table(title=f"{scores.scene}: {HEADLINE.label} in {HEADLINE.unit} by {title}, "
+                     "and share of the squared error", title_justify="left", title_style="bold")
+        grid.add_column("method")
+        for name in shown:
+            grid.add_column(f"{name} frames" if title == "history" else name, justify="right")
+        rows = {name: row for name, row in classes.items() if row}
+        pixels = next(iter(rows.values()))
+        grid.add_row("of all pixels", *(f"{pixels[c].pixels:.1%}" for c in shown), style="dim")
+        for name, row in rows.items():
+            grid.add_row(name, *(f"{_number(row[c].psnr_srgb, '.1f')} {row[c].mse_share:4.0%}"
+                                 for c in shown))
+        console.print(grid)
+
+
+def print_splits(scores: Scores, console: Console | None = None) -> None:
+    """Bias and variance: root mean squares of display values, and bias's share of the error."""
+    console = console or Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
+    grid = Table(title=f"{scores.scene}: bias and variance over seeds", title_justify="left",
+                 title_style="bold")
+    for heading in ("method", "renders", "bias", "deviation", "bias in squared error"):
+        grid.add_column(heading, justify="left" if heading == "method" else "right")
+    for name in scores.ordered():
+        if s := scores.methods[name].split:
+            bias = max(0.0, s.bias_squared)
+            grid.add_row(name, str(s.renders), f"{bias ** 0.5:.4f}", f"{s.variance ** 0.5:.4f}",
+                         f"{bias / (bias + s.variance):.0%}" if bias + s.variance else "-")
+    console.print(grid)
 
 
 def caption(scores: Scores) -> str:
@@ -87,7 +128,7 @@ def _gain(scores: Scores, method: MethodScore) -> float | None:
 def _best(scores: Scores) -> set[tuple[str, str]]:
     """(method, heading) of the best value of each metric."""
     found = set()
-    for metric in METRICS.values():
+    for metric in _COLUMNS:
         values = {name: value for name, method in scores.methods.items()
                   if (value := method[metric.name]) is not None}
         if len(values) > 1:

@@ -16,21 +16,21 @@ by rows, then by columns, each row as (count, mean, squares about its own mean),
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 import drjit as dr
-import numpy as np
 
 from render.frame import Frame
 
+from .lanes import OnLanes
 from .parameters import check_positive, check_radius, check_range
 from .reprojection import Tests, check_motion, load_table, motion_table, pack, reproject
 from .stencil import Float, Stencil, Step, Taps
-from .surface import GUIDES, Surface, camera_from_screen, read_color, read_surface
+from .surface import Surface, camera_from_screen
 
 
 @dataclass(frozen=True)
-class Temporal:
+class Temporal(OnLanes):
     """Accumulation over frames of what is given, noisy or filtered.
 
     Attributes:
@@ -40,8 +40,6 @@ class Temporal:
         nearest: the assignment's reprojection, to the nearest pixel by object alone.
         min_cosine, plane_tolerance: see `reprojection.py`; a nearest reprojection ignores them.
     """
-
-    needs: ClassVar[tuple[str, ...]] = ("color", *GUIDES)
 
     alpha: float = 0.2
     color_box: float = 1.0
@@ -61,22 +59,7 @@ class Temporal:
     def reach(self) -> int:
         return self.clamp_radius
 
-    def init(self, height: int, width: int) -> TemporalState:
-        return self.init_on(Stencil(height, width, self.reach))
-
-    def __call__(self, frame: Frame, state: TemporalState) -> tuple[np.ndarray, TemporalState]:
-        """(h, w, 3) accumulated colour, and the state for the next frame.
-
-        Raises:
-            InputError: a channel is missing, the size is not the state's, or the frame has
-                other objects than the one before it.
-        """
-        color, surface = read_color(frame, state.stencil), read_surface(frame, state.stencil)
-        color, state = self.accumulate(frame, color, surface, state)
-        return state.stencil.image(color), state
-
     def init_on(self, stencil: Stencil) -> TemporalState:
-        """State on a stencil that reaches at least `clamp_radius` pixels."""
         color, rows = stencil.planes([0.0] * 3), stencil.planes([0.0] * 6)
         window = range(-self.clamp_radius, self.clamp_radius + 1)
         tests = Tests(self.nearest, self.min_cosine, self.plane_tolerance)
@@ -91,9 +74,8 @@ class Temporal:
                              rows, rows.taps([(dy, 0) for dy in window]),
                              Step(sum_rows), Step(blend))
 
-    def accumulate(self, frame: Frame, color: list[Float], surface: Surface,
-                   state: TemporalState) -> tuple[list[Float], TemporalState]:
-        """Accumulate arrays of lanes instead of the frame's colour."""
+    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
+                 state: TemporalState) -> tuple[list[Float], TemporalState]:
         stencil, previous = state.stencil, state.previous
         guides = [surface.id, *surface.normal, surface.depth]
         dr.eval(color, guides)

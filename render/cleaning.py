@@ -9,9 +9,12 @@ from pathlib import Path
 from .atomic import is_temporary
 from .errors import InputError
 
-_OWN = re.compile(r"scores\.(json|csv)|pictures/[^/]+\.(png|mp4)|frames/\d{4,}\.(exr|json)"
-                  r"|reference/\d{4,}\.(exr|partial\.npz)|denoised/[^/]+/(\d{4,}\.exr|run\.json)")
-_FOLDERS = ("denoised/*", "frames", "reference", "denoised", "pictures")
+_OWN = re.compile(r"scores\.(json|csv)|times\.json|pictures/[^/]+\.(png|mp4)"
+                  r"|frames/\d{4,}\.(exr|json)"
+                  r"|reference/\d{4,}\.(exr|partial\.npz)|denoised/[^/]+/(\d{4,}\.exr|run\.json)"
+                  r"|report/(index\.html|scores\.(json|csv)|data/([^/]+/){1,2}\d{4,}\.js)")
+_FOLDERS = ("denoised/*", "frames", "reference", "denoised", "pictures", "report/data/*/*",
+            "report/data/*", "report/data", "report")
 
 
 def remove_sequence(folder: Path) -> None:

@@ -126,7 +126,8 @@ class Run(JsonFile):
     """How a denoised result came to be, in `denoised/METHOD/run.json`.
 
     `ms` holds milliseconds by frame number, reading and writing of files excluded; `first_ms`
-    the first call's, compilation included. Both are empty where they are not known.
+    the first call's, compilation included; `peak_mb` the most memory that the calls took, in MiB.
+    All are empty where they are not known.
     """
 
     method: Name
@@ -136,6 +137,7 @@ class Run(JsonFile):
     versions: dict[str, str] = Field(default_factory=dict)
     first_ms: FiniteFloat | None = None
     ms: dict[int, FiniteFloat] = Field(default_factory=dict)
+    peak_mb: FiniteFloat | None = None
 
 
 def check_name(name: str, what: str) -> str:

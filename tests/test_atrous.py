@@ -1,10 +1,10 @@
 import drjit as dr
 import numpy as np
-import oracles
 import pytest
 from kernels import compiled, taking_turns
 from synthetic import make_frame, noisy, with_images
 
+from denoise import oracles
 from denoise.atrous import Atrous, estimate_variance
 from denoise.stencil import Stencil
 from render.errors import InputError

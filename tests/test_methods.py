@@ -11,7 +11,8 @@ from render.errors import InputError
 from render.frame import Frame
 
 # Small windows keep these quick; the formulas are tested with the defaults elsewhere.
-SMALL = {"bilateral": {"radius": "4"}, "assignment": {"radius": "4"}, "atrous": {"levels": "3"},
+SMALL = {"bilateral": {"radius": "4"}, "bilateral-separable": {"radius": "4"},
+         "assignment": {"radius": "4"}, "atrous": {"levels": "3"},
          "assignment-atrous": {"levels": "3"}, "temporal": {}}
 
 each_method = pytest.mark.parametrize("name", METHODS)
@@ -153,7 +154,8 @@ def test_history_makes_a_still_scene_flicker_less(name):
 def test_the_unit_of_length_does_not_matter(name, unit):
     """Camera and objects stand at the origin here: only depth and position have a length."""
     frames = [noisy(make_frame(15, 18, index=i), seed=i) for i in range(2)]
-    scaled = [with_images(f, depth=unit * f["depth"], position=unit * f["position"]) for f in frames]
+    scaled = [with_images(f, depth=unit * f["depth"], position=unit * f["position"])
+              for f in frames]
     np.testing.assert_allclose(run(name, *scaled), run(name, *frames), atol=1e-4)
 
 
@@ -223,7 +225,7 @@ def test_parameters_are_read_from_text_at_any_depth():
 
 
 @pytest.mark.parametrize(("name", "settings", "words"), [
-    ("median", {}, "unknown method 'median': use bilateral, atrous"),
+    ("median", {}, "unknown method 'median': use bilateral, bil"),
     ("bilateral", {"sigma": "1"}, "no parameter 'sigma': it has radius, sigma_coord"),
     ("assignment", {"radius": "2.5"}, "radius is '2.5': use a whole number"),
     ("temporal", {"nearest": "maybe"}, "nearest is 'maybe': use true or false"),

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from denoise import flip
 from denoise.metrics import (
     HEADLINE,
     METRICS,
@@ -20,7 +21,10 @@ from denoise.metrics import (
     psnr,
     reference_floor,
     relmse,
+    smape,
+    spread,
 )
+from denoise.ssim import ssim
 from denoise.tonemap import bytes_from_linear, linear_from_srgb, srgb_from_linear
 
 
@@ -96,7 +100,8 @@ def test_a_uniform_error_of_a_tenth_is_20_db():
 
 def test_identical_images_score_the_cap_and_no_relative_error():
     image, _ = images()
-    assert measure(image, image) == {"psnr_srgb": PSNR_CAP, "relmse": 0.0}
+    best = {"psnr_srgb": PSNR_CAP, "ssim": pytest.approx(1.0)}
+    assert measure(image, image) == {name: best.get(name, 0.0) for name in METRICS}
 
 
 def test_decibels_never_exceed_the_cap():
@@ -114,11 +119,12 @@ def test_a_metric_gets_worse_with_more_noise(metric):
 
 
 @pytest.mark.parametrize("metric", METRICS.values(), ids=lambda m: m.name)
-def test_a_metric_ignores_the_order_of_pixels_and_colours(metric):
-    # Laws of the pointwise measures; one that looks at neighbours is not held to it.
+def test_a_metric_does_not_care_which_way_up_an_image_is(metric):
     image, reference = images()
-    flipped = measure(image[::-1, :, ::-1], reference[::-1, :, ::-1])[metric.name]
-    assert flipped == pytest.approx(measure(image, reference)[metric.name], rel=1e-9)
+    colours = 1 if metric.name.startswith("flip") else -1  # the eye tells red from blue
+    flipped = measure(image[::-1, :, ::colours], reference[::-1, :, ::colours])[metric.name]
+    rel = 1e-9 if colours == -1 else 1e-4
+    assert flipped == pytest.approx(measure(image, reference)[metric.name], rel=rel)
 
 
 def test_mse_is_symmetric_and_quadratic():
@@ -175,8 +181,100 @@ def test_a_pixel_that_the_reference_does_not_know_is_not_judged():
 @pytest.mark.parametrize("scale", [1e-30, 1e30])
 def test_extreme_radiance_gives_finite_scores(scale):
     image, reference = images()
-    values = measure(image * np.float32(scale), reference)
-    assert all(map(math.isfinite, values.values()))
+    for values in (measure(image * np.float32(scale), reference),
+                   measure(image, reference * np.float32(scale))):
+        assert all(math.isfinite(v) for v in values.values() if v is not None)
+
+
+@pytest.mark.parametrize(("count", "chosen"), [
+    (None, [3, 4, 7, 9, 11]), (5, [3, 4, 7, 9, 11]), (3, [3, 7, 11]), (2, [3, 11])])
+def test_frames_of_a_slow_metric_are_spread_evenly(count, chosen):
+    assert spread([3, 4, 7, 9, 11], count) == chosen
+
+
+# SMAPE, SSIM and FLIP
+
+
+def test_smape_equals_its_definition_written_as_a_loop():
+    image, reference = images()
+    total = sum(abs(a - b) / (abs(a) + abs(b) + 0.01)
+                for a, b in zip(map(float, image.flat), map(float, reference.flat)))
+    assert smape(image, reference) == pytest.approx(total / image.size, rel=1e-6)
+
+
+def ssim_by_the_paper(a: np.ndarray, b: np.ndarray) -> float:
+    """Wang et al. 2004, eq. 13 to 16, one window at a time."""
+    offsets = np.arange(-5, 6)
+    weight = np.exp(-(offsets[:, None]**2 + offsets**2) / (2 * 1.5**2))
+    weight /= weight.sum()
+    values = []
+    for y in range(5, a.shape[0] - 5):
+        for x in range(5, a.shape[1] - 5):
+            for c in range(3):
+                p, q = (i[y - 5:y + 6, x - 5:x + 6, c].astype(np.float64) for i in (a, b))
+                mp, mq = (weight * p).sum(), (weight * q).sum()
+                vp, vq = (weight * (p - mp)**2).sum(), (weight * (q - mq)**2).sum()
+                covariance = (weight * (p - mp) * (q - mq)).sum()
+                values.append((2 * mp * mq + 1e-4) * (2 * covariance + 9e-4)
+                              / ((mp**2 + mq**2 + 1e-4) * (vp + vq + 9e-4)))
+    return float(np.mean(values))
+
+
+def test_ssim_equals_the_papers_formula():
+    a, b = map(srgb_from_linear, images(height=14, width=17))
+    assert ssim(a, b) == pytest.approx(ssim_by_the_paper(a, b), rel=1e-9)
+
+
+def test_ssim_has_the_value_of_scikit_image():
+    y, x = np.mgrid[:24, :31]
+    a = np.stack([0.5 + 0.4 * np.sin(0.3 * x + 0.1 * y), x / 31, y / 24], axis=-1)
+    assert ssim(a, a[::-1]) == pytest.approx(0.26839913684219324, rel=1e-9)  # 0.26
+
+
+def test_an_image_smaller_than_the_window_is_mirrored():
+    image, reference = images(height=3, width=4)
+    assert ssim(image, image) == pytest.approx(1.0)
+    assert 0 < ssim(*map(srgb_from_linear, (image, reference))) < 1
+
+
+needs_flip = pytest.mark.skipif(not flip.AVAILABLE, reason="flip-evaluator is not installed")
+
+
+@needs_flip
+def test_flip_of_opposites_is_one_and_of_a_just_visible_step_is_small():
+    black, white = np.zeros((40, 40, 3), np.float32), np.ones((40, 40, 3), np.float32)
+    assert flip.flip(white, black) > 0.9
+    assert 0 < flip.flip(black + np.float32(1 / 255), black) < 0.03
+    assert flip.flip_map(white, black).shape == (40, 40)
+
+
+@needs_flip
+def test_hdr_flip_has_the_exposures_that_the_library_finds_itself():
+    import flip_evaluator
+
+    image, reference = images(height=32, width=32)
+    _, score, found = flip_evaluator.evaluate(reference, image, "HDR", False, False)
+    assert flip.exposures(reference) == pytest.approx(
+        (found["startExposure"], found["stopExposure"]), abs=1e-3)
+    assert flip.hdr_flip(image, reference) == pytest.approx(score, rel=1e-3)
+
+
+@needs_flip
+@pytest.mark.parametrize("reference", [
+    np.full((5, 6, 3), 3.0), np.full((5, 6, 3), 1e30),
+    1e-20 + np.eye(6)[..., None] * [9.0, 0.0, 1.0]])
+def test_hdr_flip_survives_references_without_a_range(reference):
+    value = flip.hdr_flip(np.full(reference.shape, 0.4, np.float32), reference.astype(np.float32))
+    assert value is not None
+    assert 0 < value <= 1
+    start, stop = flip.exposures(reference)
+    assert start <= stop <= start + 24
+
+
+@needs_flip
+def test_hdr_flip_is_not_measured_where_a_display_shows_everything():
+    image, _ = images()
+    assert flip.hdr_flip(image, np.full(image.shape, 0.9)) is None
 
 
 # The reference's own noise

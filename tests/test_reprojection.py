@@ -1,8 +1,8 @@
 import numpy as np
-import oracles
 import pytest
 from synthetic import make_frame, translation, turn, with_images
 
+from denoise import oracles
 from denoise.reprojection import motion_table
 from denoise.temporal import Temporal
 

@@ -27,7 +27,7 @@ def lanes(stencil, image):
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize(("height", "width", "reach"),
-                         [(1, 1, 1), (1, 7, 3), (5, 3, 4), (13, 17, 2)])
+                         [(1, 1, 1), (1, 7, 3), (5, 3, 4), (13, 17, 2), (3, 5, 17)])
 def test_taps_are_the_shifted_image_with_the_outside_value_around_it(layout, height, width, reach):
     stencil = stencil_of(height, width, reach, layout)
     image = np.random.default_rng(0).random((height, width)).astype(np.float32)
@@ -51,6 +51,16 @@ def test_storing_again_is_seen_by_taps_made_before():
     for value in (2.0, 3.0):
         planes.store([stencil.constant(value)])
         assert stencil.image(taps.at(0))[2].tolist() == [value] * 4 + [0.0]
+
+
+def test_taps_straight_above_and_below_start_at_a_cache_line():
+    """A vector load across two lines takes twice as long."""
+    for width, reach in ((5, 3), (512, 32), (720, 16)):
+        stencil = stencil_of(3, width, reach)
+        taps = stencil.planes([0.0] * 3).taps([(-reach, 0), (0, 0), (1, 0), (0, 1)])
+        starts = [view.numpy().ctypes.data % 64 for t in range(4) for view in taps.at(t)]
+        assert starts == [0] * 9 + [4] * 3
+        assert stencil.stride // 16 % 2 == 1  # rows far apart share no set of the cache
 
 
 def test_a_tap_beyond_the_reach_is_refused():
@@ -127,7 +137,7 @@ def test_a_step_records_again_for_another_number_of_lanes():
         return [arrays[0] * 0 + dr.width(arrays[0])]  # a width is baked into a recording
 
     step = Step(mean_column)
-    for width in (5, 9, 5):
+    for width in (5, 40, 5):
         stencil = stencil_of(2, width, 1)
         assert step([stencil.constant(1)])[0][0] == stencil.lanes
     assert step.recordings == 2

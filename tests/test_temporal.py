@@ -1,9 +1,9 @@
 import numpy as np
-import oracles
 import pytest
 from kernels import compiled, taking_turns
 from synthetic import make_frame, noisy, translation, turn, with_images
 
+from denoise import oracles
 from denoise.stencil import Stencil
 from denoise.temporal import Temporal, row_moments, window_moments
 from render.errors import InputError

@@ -41,29 +41,42 @@ def read(frame: Frame, **more: np.ndarray) -> Pixels:
                   z=frame["depth"], surface=surface, **more)
 
 
-def bilateral(frame: Frame, radius: int = 16, sigma_coord: float = 32, sigma_color: float = 0.6,
-              sigma_normal: float = 0.1, sigma_plane: float = 0.1) -> np.ndarray:
+def bilateral(frame: Frame, radius: int = 16, **sigmas: float) -> np.ndarray:
     """The assignment's J; see denoise/bilateral.py."""
-    pixels, shape = read(frame), frame["id"].shape
+    side = range(-radius, radius + 1)
+    return joint_mean(frame, frame["color"], [(dy, dx) for dy in side for dx in side], **sigmas)
+
+
+def bilateral_separable(frame: Frame, radius: int = 16, **sigmas: float) -> np.ndarray:
+    """J along rows, then along columns; see denoise/separable.py."""
+    side = range(-radius, radius + 1)
+    rows = joint_mean(frame, frame["color"], [(0, dx) for dx in side], **sigmas)
+    return joint_mean(frame, rows, [(dy, 0) for dy in side], **sigmas)
+
+
+def joint_mean(frame: Frame, color: np.ndarray, offsets: list[tuple[int, int]],
+               sigma_coord: float = 32, sigma_color: float = 0.6, sigma_normal: float = 0.1,
+               sigma_plane: float = 0.1) -> np.ndarray:
+    """Mean of a colour over taps, weighed by the assignment's J."""
+    pixels, shape = read(frame, c=color), frame["id"].shape
     total, weights = np.zeros((*shape, 3)), np.zeros(shape)
-    for dy in range(-radius, radius + 1):
-        for dx in range(-radius, radius + 1):
-            where, p, q = pairs(pixels, shape, dy, dx)
-            if where is None:
-                continue
-            both = (p.surface > 0) & (q.surface > 0)
-            cosine = np.where(both, (p.n * q.n).sum(-1), 1).clip(-1, 1)
-            d = q.position - p.position
-            distance = np.sqrt((d**2).sum(-1))
-            across = (p.n * d).sum(-1) / np.maximum(distance, 1e-30)
-            sine = np.where(both & (distance > 0), across, 0)
-            j = np.exp(-(dy**2 + dx**2) / (2 * sigma_coord**2)
-                       - ((p.color - q.color)**2).sum(-1) / (2 * sigma_color**2)
-                       - np.arccos(cosine)**2 / (2 * sigma_normal**2)
-                       - sine**2 / (2 * sigma_plane**2))
-            j = np.where(p.surface == q.surface, j, 0)
-            total[where] += j[..., None] * q.color
-            weights[where] += j
+    for dy, dx in offsets:
+        where, p, q = pairs(pixels, shape, dy, dx)
+        if where is None:
+            continue
+        both = (p.surface > 0) & (q.surface > 0)
+        cosine = np.where(both, (p.n * q.n).sum(-1), 1).clip(-1, 1)
+        d = q.position - p.position
+        distance = np.sqrt((d**2).sum(-1))
+        across = (p.n * d).sum(-1) / np.maximum(distance, 1e-30)
+        sine = np.where(both & (distance > 0), across, 0)
+        j = np.exp(-(dy**2 + dx**2) / (2 * sigma_coord**2)
+                   - ((p.c - q.c)**2).sum(-1) / (2 * sigma_color**2)
+                   - np.arccos(cosine)**2 / (2 * sigma_normal**2)
+                   - sine**2 / (2 * sigma_plane**2))
+        j = np.where(p.surface == q.surface, j, 0)
+        total[where] += j[..., None] * q.c
+        weights[where] += j
     return total / weights[..., None]
 
 
@@ -98,8 +111,8 @@ def window_variance(frame: Frame, lum: np.ndarray, sigma_plane: float,
 def blur3x3(image: np.ndarray) -> np.ndarray:
     padded = np.pad(image, 1)
     h, w = image.shape
-    return sum(padded[1 + dy:1 + dy + h, 1 + dx:1 + dx + w] * 0.25 / 2**abs(dy) / 2**abs(dx)
-               for dy in (-1, 0, 1) for dx in (-1, 0, 1))
+    return np.sum([padded[1 + dy:1 + dy + h, 1 + dx:1 + dx + w] * 0.25 / 2**abs(dy) / 2**abs(dx)
+                   for dy in (-1, 0, 1) for dx in (-1, 0, 1)], axis=0)
 
 
 def atrous(frame: Frame, levels: int = 5, sigma_luminance: float = 4, sigma_plane: float = 0.01,

@@ -1,0 +1,187 @@
+"""How fast the kernels are on this machine: against a trained network, and against its limits.
+
+`ms` is a kernel's own time: what it is given and what it returns are arrays on the device.
+`call_ms` is the method's whole call, from a frame of NumPy images to a NumPy image. All take turns,
+so that what else the machine does meets all alike, and each number is a median. The yardstick is
+Open Image Denoise's fast quality, as a method too, with albedo and normal.
+
+The shares of bandwidth and of arithmetic set the least that a kernel can do, counted by hand from
+the code below, against what `limits.py` has measured; the greater of the two says what bounds it.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from statistics import median
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from render import backend
+from render.frame import Frame
+
+from . import limits, oracles
+from .methods import build
+from .oidn import AVAILABLE, Oidn
+from .probe import probe
+from .surface import read_color, read_surface
+from .timing import timed
+
+WARM_UP, FRAMES = 3, 4
+CROP = (40, 56)  # height, width of the frames for the error
+_BILATERAL_TAP, _ATROUS_TAP = 62, 49  # operations, an FMA being two
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A row of the table.
+
+    Attributes:
+        operations, bytes: a pixel, at the least; an array read or written is four bytes, once
+            for every launch that needs it.
+        expected: float64 result of the second of two frames.
+    """
+
+    operations: int
+    bytes: int
+    expected: Callable[[Frame, Frame], np.ndarray]
+
+
+def _accumulated(previous: Frame, frame: Frame, old: np.ndarray, new: np.ndarray) -> np.ndarray:
+    return oracles.accumulate(new, oracles.reproject_bilinear(previous, frame, old))
+
+
+_ATROUS = (5 * (24 * _ATROUS_TAP + 17) + 48 * 13, 4 * (5 * 35 + 27))
+_TEMPORAL = (600, 4 * 60)
+
+KERNELS = {
+    "bilateral": Kernel(33 * 33 * _BILATERAL_TAP, 4 * 33 * 29,
+                        lambda _, frame: oracles.bilateral(frame)),
+    "bilateral-separable": Kernel(2 * 33 * _BILATERAL_TAP, 4 * 2 * 31,
+                                  lambda _, frame: oracles.bilateral_separable(frame)),
+    "atrous": Kernel(*_ATROUS, lambda _, frame: oracles.atrous(frame)),
+    "temporal": Kernel(*_TEMPORAL, lambda previous, frame: _accumulated(
+        previous, frame, previous["color"], frame["color"])),
+    "assignment-atrous": Kernel(
+        _ATROUS[0] + _TEMPORAL[0], _ATROUS[1] + _TEMPORAL[1],
+        lambda previous, frame: _accumulated(previous, frame, oracles.atrous(previous),
+                                             oracles.atrous(frame))),
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """Milliseconds and shares of one kernel; None where there is no yardstick."""
+
+    ms: float
+    call_ms: float
+    first_ms: float
+    share_of_oidn_fast: float | None
+    call_share_of_oidn_fast: float | None
+    max_error: float
+    share_of_bandwidth: float
+    share_of_arithmetic: float
+
+
+@dataclass(frozen=True)
+class Bench:
+    """All that `onespp bench` says."""
+
+    kernels: dict[str, Row]
+    width: int
+    height: int
+    repeats: int
+    oidn_fast_ms: float | None
+    bandwidth_gb_s: float
+    arithmetic_gflop_s: float
+    device: str
+    threads: int
+    processor: str
+
+    def json_text(self) -> str:
+        return json.dumps(asdict(self), indent=2) + "\n"
+
+
+def bench(height: int, width: int, repeats: int,
+          on_step: Callable[[int, int], None] = lambda done, total: None) -> Bench:
+    """Measure every kernel. `on_step` is told the rounds done and their number."""
+    total = repeats + 2
+    runs = {name: _Run(name, height, width) for name in KERNELS}
+    network = _Network(height, width) if AVAILABLE else None
+    on_step(1, total)
+    for i in range(repeats):
+        for run in (network, *runs.values()):
+            if run:
+                run.measure(i % FRAMES)
+        on_step(2 + i, total)
+    oidn = median(network.ms) if network else None
+    bandwidth, arithmetic = limits.memory_bandwidth(), limits.arithmetic()
+    rows = {}
+    for name, run in runs.items():
+        kernel, ms, call = KERNELS[name], median(run.ms), median(run.call_ms)
+        per_ms = height * width / ms * 1e-6  # times operations or bytes a pixel: giga a second
+        rows[name] = Row(ms, call, run.first_ms, oidn and ms / oidn, oidn and call / oidn,
+                         max_error(name), kernel.bytes * per_ms / bandwidth,
+                         kernel.operations * per_ms / arithmetic)
+    on_step(total, total)
+    return Bench(rows, width, height, repeats, oidn, bandwidth, arithmetic, backend.choose(),
+                 dr.thread_count(), platform.processor() or platform.machine())
+
+
+def max_error(name: str) -> float:
+    """Largest difference from the formula in float64, radiance, over a small moving scene."""
+    previous, frame = (probe(*CROP, i, textured=False) for i in range(2))
+    method = build(name)
+    _, state = method(previous, method.init(*CROP))
+    image, _ = method(frame, state)
+    return float(np.abs(image - KERNELS[name].expected(previous, frame)).max())
+
+
+class _Run:
+    """A method with its state, and its times."""
+
+    def __init__(self, name: str, height: int, width: int) -> None:
+        self.method: Any = build(name)
+        self.frames = [probe(height, width, i) for i in range(FRAMES)]
+        self.bare = [probe(height, width, i, textured=False) for i in range(FRAMES)]
+        self.state, self.kernel_state = (self.method.init(height, width) for _ in range(2))
+        self.ms: list[float] = []
+        self.call_ms: list[float] = []
+        self.first_ms = timed(lambda: self.method(self.frames[0], self.state))[1]
+        for i in range(WARM_UP):
+            self.measure(i)
+        self.ms.clear()
+        self.call_ms.clear()
+
+    def measure(self, i: int) -> None:
+        (_, self.state), ms = timed(lambda: self.method(self.frames[i], self.state))
+        self.call_ms.append(ms)
+        stencil = self.kernel_state.stencil
+        color, surface = read_color(self.bare[i], stencil), read_surface(self.bare[i], stencil)
+        dr.eval(color, surface)
+
+        def kernel() -> Any:
+            result = self.method.on_lanes(self.bare[i], color, surface, self.kernel_state)
+            dr.eval(result[0])
+            return result
+
+        (_, self.kernel_state), ms = timed(kernel)
+        self.ms.append(ms)
+
+
+class _Network:
+    """Open Image Denoise, and its times."""
+
+    def __init__(self, height: int, width: int) -> None:
+        self.method = Oidn(quality="fast")
+        self.frames = [probe(height, width, i) for i in range(FRAMES)]
+        self.state = self.method.init(height, width)
+        self.method(self.frames[0], self.state)
+        self.ms: list[float] = []
+
+    def measure(self, i: int) -> None:
+        self.ms.append(timed(lambda: self.method(self.frames[i], self.state))[1])

@@ -1,0 +1,88 @@
+"""A method's squared error split into bias and variance, by renders of the same frames with other
+seeds.
+
+Symbols: a_k the method's result on render k of K, b the reference, both on the display (clipped
+sRGB); A the mean of the a_k; v the reference's own noise there (`metrics.reference_floor`); means
+over pixels, colours and frames.
+
+    variance = mean(sum_k (a_k - A)^2 / (K - 1))        what another seed would change
+    bias^2   = mean((A - b)^2) - variance / K - v       what none would: blur, lag, colour shift
+    MSE      = mean over k of mean((a_k - b)^2) = bias^2 + variance + v
+
+Both are unbiased estimates, so a bias^2 near 0 may come out below it. What the display clips is
+biased: the noisy input has a bias too, though its radiance has none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from render.errors import InputError
+from render.manifest import first_difference
+from render.sequence import Sequence
+
+from .metrics import pair, reference_floor
+from .scorecard import INPUT, ErrorSplit
+
+
+def split_errors(sequences: list[Sequence], methods: list[str]) -> dict[str, ErrorSplit]:
+    """The split for each method that all sequences have results of.
+
+    Args:
+        sequences: two or more of the same scene, frames and size with different seeds; references
+            are those of the first.
+
+    Raises:
+        InputError: the sequences differ in more than the seed, or do not differ in it.
+    """
+    _check(sequences)
+    sums = {name: np.zeros(3) for name in methods}
+    counts = dict.fromkeys(methods, 0)
+    for i in sequences[0].frames:
+        if not sequences[0].has_reference(i):
+            continue
+        reference = sequences[0].read_reference(i)
+        noise = 0.0
+        if np.isfinite(reference.variance).any():
+            noise = 10 ** (-reference_floor(reference.color, reference.variance) / 10)
+        for name in methods:
+            images = [_read(s, name, i) for s in sequences if _has(s, name, i)]
+            if len(images) == len(sequences):
+                sums[name] += _split([pair(image, reference.color).srgb for image in images], noise)
+                counts[name] += 1
+    return {name: ErrorSplit(renders=len(sequences), frames=counts[name], mse=float(mse),
+                             bias_squared=float(bias), variance=float(variance))
+            for name in methods if counts[name]
+            for mse, bias, variance in [sums[name] / counts[name]]}
+
+
+def _split(images: list[tuple[np.ndarray, np.ndarray]], noise: float) -> np.ndarray:
+    """MSE, bias^2 and variance of one frame."""
+    a = np.stack([image for image, _ in images]).astype(np.float64)
+    b = images[0][1].astype(np.float64)
+    variance = a.var(axis=0, ddof=1).mean()
+    bias = np.mean((a.mean(axis=0) - b) ** 2) - variance / len(a) - noise
+    return np.array([np.mean((a - b) ** 2), bias, variance])
+
+
+def _check(sequences: list[Sequence]) -> None:
+    first = sequences[0].manifest
+    for other in sequences[1:]:
+        changed = other.manifest.model_copy(update={"seed": first.seed})
+        if key := first_difference(first, changed):
+            raise InputError(f"{other.folder} has another {key} than {sequences[0].folder}: "
+                             "--seeds takes renders that differ in the seed alone")
+    seeds = [s.manifest.seed for s in sequences]
+    if None in seeds or len(set(seeds)) < len(seeds):
+        raise InputError(f"the seeds are {', '.join(map(str, seeds))}: --seeds takes renders of "
+                         "different seeds (`onespp render --seed`)")
+
+
+def _has(sequence: Sequence, method: str, i: int) -> bool:
+    return sequence.has_frame(i) if method == INPUT else sequence.has_result(method, i)
+
+
+def _read(sequence: Sequence, method: str, i: int) -> np.ndarray:
+    if method == INPUT:
+        return sequence.read_frame(i, ("color",))["color"]
+    return sequence.read_result(method, i)

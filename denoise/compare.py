@@ -1,0 +1,256 @@
+"""What got better or worse between two scores of a sequence, against the noise of measuring it.
+
+Frame by frame: d_t = B_t - A_t over the frames that both have, so that what frames have in common
+cancels. The change is the mean of d_t, its standard error
+
+    s / sqrt(n_e),   s the standard deviation of d_t,   n_e = n (1 - r) / (1 + r),
+
+where r is the correlation of d_t with d_{t-1}, between 0 and 0.9: neighbouring frames show the
+same and are no independent measurements (an AR(1) model of them, a heuristic). A change counts
+where it is more than two standard errors from 0. Time is compared as the logarithm of B_t / A_t,
+without the first frame, in which kernels compile; its error does not know how much the machine's
+speed changes from run to run.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from typing import Literal
+
+import numpy as np
+from pydantic import FiniteFloat
+from rich.console import Console
+from rich.table import Table
+
+from render.errors import InputError
+from render.json_file import JsonFile, format_json
+
+from .metrics import Metric
+from .scorecard import MethodScore, Scores
+from .stability import MEASURES
+from .table import PLAIN_WIDTH
+
+TIME = Metric("ms", "time", lambda a, b: None, "", "ms", False, ".1f", "milliseconds a frame")
+ROWS: Mapping[str, Metric] = {**MEASURES, TIME.name: TIME}
+SIGMAS = 2.0
+DB, SHARE = 0.1, 0.02
+"""What may get worse unless told otherwise: dB, and the share of a measure in another unit."""
+
+_MOST_CORRELATED = 0.9
+
+
+class Threshold(JsonFile):
+    """How much worse is too much: a number in the measure's unit, or a share of A's value."""
+
+    limit: FiniteFloat
+    relative: bool
+
+
+class Change(JsonFile):
+    """One measure of one method.
+
+    Attributes:
+        a, b: means over the frames that both have; of time, geometric ones.
+        change: of the measure, in its unit; of time, B / A - 1.
+        error: its standard error; None where one frame alone was measured.
+        frames: how many both have.
+        verdict: better or worse where the change is beyond its noise, else same.
+        failed: worse, and by more than the threshold.
+    """
+
+    method: str
+    measure: str
+    a: FiniteFloat
+    b: FiniteFloat
+    change: FiniteFloat
+    error: FiniteFloat | None
+    frames: int
+    verdict: Literal["better", "worse", "same"]
+    failed: bool
+
+
+class Comparison(JsonFile):
+    """What `onespp compare` found; notes are sentences that a reader must know."""
+
+    scene: str
+    changes: list[Change]
+    notes: list[str]
+
+    @property
+    def failed(self) -> bool:
+        return any(change.failed for change in self.changes)
+
+    def json_text(self) -> str:
+        return format_json(self)
+
+
+def parse_thresholds(texts: tuple[str, ...]) -> dict[str, Threshold]:
+    """Thresholds of texts such as psnr_srgb=0.2 and ms=20%; InputError where one is not."""
+    found = {}
+    for text in texts:
+        name, _, limit = text.partition("=")
+        match = re.fullmatch(r"([0-9]+\.?[0-9]*|\.[0-9]+)(%?)", limit.strip())
+        if not match:
+            raise InputError(f"--threshold {text[:60]} is not understood: use NAME=LIMIT, as in "
+                             "psnr_srgb=0.2 or ms=20%")
+        if name.strip() not in ROWS:
+            raise InputError(f"--threshold {text[:60]} names no measure: they are "
+                             f"{', '.join(ROWS)}")
+        relative = match[2] == "%"
+        if name.strip() == TIME.name and not relative:
+            raise InputError(f"--threshold {text[:60]} is not a share: write it as ms=20%")
+        found[name.strip()] = Threshold(limit=float(match[1]) / (100 if relative else 1),
+                                        relative=relative)
+    return found
+
+
+def comparison(a: Scores, b: Scores, methods: list[str] | None = None,
+               thresholds: Mapping[str, Threshold] | None = None) -> Comparison:
+    """Every measure of every method that both scores have; B is the later one.
+
+    Raises:
+        InputError: scores of different sequences, nothing in common, or an unknown method.
+    """
+    for key in ("scene", "size", "tone_map"):
+        if (old := getattr(a, key)) != (new := getattr(b, key)):
+            raise InputError(f"the scores are not of one sequence: {key.replace('_', ' ')} is "
+                             f"{old} in A and {new} in B")
+    both = [name for name in a.ordered() if name in b.methods]
+    for name in methods or ():
+        if name not in both:
+            raise InputError(f"the method '{name}' is not in both scores, which share "
+                             f"{', '.join(both) or 'none'}")
+    chosen = [name for name in both if methods is None or name in methods]
+    changes = [change for name in chosen for row in ROWS.values()
+               if (change := _change(name, row, a.methods[name], b.methods[name],
+                                     thresholds or {}))]
+    if not changes:
+        raise InputError("the scores have no frame of a method in common: there is nothing to "
+                         "compare")
+    return Comparison(scene=a.scene, changes=changes, notes=list(_notes(a, b)))
+
+
+def _change(name: str, row: Metric, a: MethodScore, b: MethodScore,
+            thresholds: Mapping[str, Threshold]) -> Change | None:
+    old, new = _common(row, a, b)
+    if not old.size:
+        return None
+    with np.errstate(divide="ignore", invalid="ignore"):
+        difference = np.log(new / old) if row is TIME else new - old
+    if not np.isfinite(difference).all():
+        return None
+    mean, error = float(difference.mean()), standard_error(difference)
+    mean_a, mean_b = ((math.exp(np.log(x).mean()) if row is TIME else float(x.mean()))
+                      for x in (old, new))
+    beyond = mean != 0 and error is not None and abs(mean) > SIGMAS * error
+    worse = (mean < 0) == row.higher_is_better
+    verdict = "same" if not beyond else "worse" if worse else "better"
+    change = math.expm1(mean) if row is TIME else mean
+    threshold = thresholds.get(row.name) or _standard(row)
+    limit = math.inf if threshold is None else threshold.limit * (
+        abs(mean_a) if threshold.relative and row is not TIME else 1)
+    return Change(method=name, measure=row.name, a=mean_a, b=mean_b, change=change, error=error,
+                  frames=old.size, verdict=verdict,
+                  failed=verdict == "worse" and abs(change) > limit)
+
+
+def _common(row: Metric, a: MethodScore, b: MethodScore) -> tuple[np.ndarray, np.ndarray]:
+    """The measure on the frames that both have it for, in order."""
+    def values(method: MethodScore) -> dict[int, float]:
+        rows = method.per_frame[1:] if row is TIME else method.per_frame
+        return {r.frame: v for r in rows
+                if (v := r.ms if row is TIME else r[row.name]) is not None}
+
+    old, new = values(a), values(b)
+    frames = sorted(old.keys() & new.keys())
+    return np.array([old[i] for i in frames]), np.array([new[i] for i in frames])
+
+
+def standard_error(values: np.ndarray) -> float | None:
+    """Of the mean of (n,) values in order of time; None for fewer than two."""
+    n = len(values)
+    if n < 2:
+        return None
+    rest = values - values.mean()
+    power = float(rest @ rest)
+    if power == 0:
+        return 0.0
+    r = min(max(float(rest[1:] @ rest[:-1]) / power, 0.0), _MOST_CORRELATED)
+    return math.sqrt(power / (n - 1) / (n * (1 - r) / (1 + r)))
+
+
+def _standard(row: Metric) -> Threshold | None:
+    if row is TIME:
+        return None
+    if row.unit == "dB":
+        return Threshold(limit=DB, relative=False)
+    return Threshold(limit=SHARE, relative=True)
+
+
+def _notes(a: Scores, b: Scores) -> Iterator[str]:
+    for key, what in (("seed", "seeds"), ("spp", "samples a pixel"),
+                      ("reference_spp", "references")):
+        if (old := getattr(a, key)) != (new := getattr(b, key)):
+            yield f"A and B have different {what}: {old} and {new}."
+    if a.frames != b.frames:
+        yield (f"A has {len(a.frames)} frames and B {len(b.frames)}; compared are those that "
+               "both have.")
+    for mine, others, which in ((a, b, "A"), (b, a, "B")):
+        alone = [name for name in mine.methods if name not in others.methods]
+        if alone:
+            yield f"Only {which} has {', '.join(alone)}."
+    for name in (n for n in a.ordered() if n in b.methods):
+        if a.methods[name].parameters != b.methods[name].parameters:
+            yield f"{name} has other parameters in B."
+
+
+def print_comparison(found: Comparison, show_all: bool = False,
+                     console: Console | None = None) -> None:
+    """Table of what changed, then notes and a closing line."""
+    console = console or Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
+    shown = [c for c in found.changes if show_all or c.verdict != "same" or c.failed]
+    if shown:
+        console.print(_table(found.scene, shown))
+    same = len(found.changes) - sum(c.verdict != "same" for c in found.changes)
+    if same:
+        console.print(f"{same} of {len(found.changes)} measures are the same, to within "
+                      f"{SIGMAS:g} standard errors.", style="dim", highlight=False)
+    for note in found.notes:
+        console.print(note, style="yellow", highlight=False)
+    failures = [c for c in found.changes if c.failed]
+    if failures:
+        found_in = {c.method: ", ".join(ROWS[d.measure].label for d in failures
+                                        if d.method == c.method) for c in failures}
+        names = "; ".join(f"{method}: {labels}" for method, labels in found_in.items())
+        console.print(f"Worse past the threshold: {names}.", style="bold red", highlight=False)
+
+
+def _table(scene: str, changes: list[Change]) -> Table:
+    grid = Table(title=f"{scene}: B against A", title_justify="left", title_style="bold")
+    for heading in ("method", "measure", "A", "B", "change", ""):
+        grid.add_column(heading, justify="left" if heading in ("method", "measure", "") else
+                        "right", no_wrap=True)
+    colours = {"better": "green", "worse": "red", "same": "dim"}
+    for i, c in enumerate(changes):
+        row = ROWS[c.measure]
+        first = i == 0 or changes[i - 1].method != c.method
+        if first and i:
+            grid.add_section()
+        word = "WORSE" if c.failed else c.verdict
+        grid.add_row(c.method if first else "", f"{row.label} ({row.unit})" if row.unit else
+                     row.label, f"{c.a:{row.format}}", f"{c.b:{row.format}}", _amount(c, row),
+                     f"[{colours[c.verdict]}]{word}[/]")
+    return grid
+
+
+def _amount(c: Change, row: Metric) -> str:
+    """The change and its standard error, in two digits of the latter."""
+    if row is TIME:
+        error = "" if c.error is None else f" ± {100 * c.error:.1f}"
+        return f"{100 * c.change:+.1f}{error} %"
+    digits = 4 if not c.error else min(8, max(2, 1 - math.floor(math.log10(c.error))))
+    error = "" if c.error is None else f" ± {c.error:.{digits}f}"
+    return f"{c.change:+.{digits}f}{error}"

@@ -1,0 +1,40 @@
+"""What a method costs: time a frame, the time it takes to start, throughput, memory."""
+
+from __future__ import annotations
+
+from statistics import median
+from typing import Any
+
+from render.manifest import Run
+from render.sequence import Sequence
+
+from .interleave import Times
+
+STARTING = 3  # frames in which kernels compile: a history's are first needed in the second
+
+
+def cost(sequence: Sequence, run: Run | None, times: Times | None) -> dict[str, Any]:
+    """Fields of `MethodScore` from a run; the warm median is `times`' where it has the method.
+
+    `times` count if they are of the same parameters, size and device.
+    """
+    run = run or Run(method="input")
+    ms = [run.ms[i] for i in sorted(run.ms)]
+    height, width = sequence.size
+    measured = times.methods.get(run.method) if times else None
+    interleaved = (times is not None and measured is not None
+                   and measured.parameters == run.parameters
+                   and (times.size, times.device) == ((width, height), run.device))
+    warm = measured.ms if measured and interleaved else median(ms[1:]) if ms[1:] else None
+    return {"ms_per_frame": warm, "first_ms": run.first_ms, "interleaved": interleaved,
+            "startup_ms": startup(ms), "peak_mb": run.peak_mb,
+            "megapixels_per_s": width * height / warm / 1e3 if warm else None,
+            "device": run.device, "threads": run.threads, "parameters": run.parameters,
+            "versions": run.versions}
+
+
+def startup(ms: list[float]) -> float | None:
+    """Time of the first frames beyond the median of the others; None with too few frames."""
+    starting = ms[:STARTING if len(ms) > STARTING else 1]
+    rest = ms[len(starting):]
+    return sum(max(0.0, t - median(rest)) for t in starting) if rest else None

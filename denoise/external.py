@@ -1,0 +1,85 @@
+"""Any program as a method: it reads frames in the assignment's layout and writes results.
+
+`'PROGRAM {input} {output} {frames}'`: {input} becomes a folder with beauty_0.exr, normal_0.exr, ...
+(`render/games202.py`), {output} an empty one, where the program leaves result_0.exr, ...; {frames}
+is how many there are. The line is split as a shell would, and no shell runs it.
+"""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+from render.errors import InputError
+from render.games202 import export_games202, import_result
+from render.manifest import Run, check_name
+from render.sequence import Sequence
+
+PLACES: tuple[str, ...] = ("{input}", "{output}", "{frames}")
+
+
+def denoise_externally(sequence: Sequence, command: str, name: str) -> Run:
+    """Export the frames, run the program, import its results as those of the method `name`.
+
+    Returns:
+        The run. Its time a frame is the program's wall time, with its start and its reading and
+        writing of files, over the number of frames: the same for all of them.
+
+    Raises:
+        InputError: the command cannot be used or fails (the message has its exit code and the
+            last line it wrote to stderr), or it left no results, or bad ones.
+    """
+    check_name(name, "method")
+    words = _split(command)
+    if missing := [i for i in sequence.frames if not sequence.has_frame(i)]:
+        raise InputError(f"{sequence.folder} lacks frame {missing[0]}: render all frames first")
+    with tempfile.TemporaryDirectory(prefix="onespp-") as folder:
+        given, made = Path(folder, "input"), Path(folder, "output")
+        made.mkdir()
+        export_games202(sequence, given)
+        places = dict(zip(PLACES, (str(given), str(made), str(len(sequence.frames)))))
+        ms = _run([_filled(word, places) for word in words]) / len(sequence.frames)
+        sequence.remove_results(name)
+        done = import_result(sequence, made, name)
+    run = Run(method=name, parameters={"external": command, "timing": "whole program, with files"},
+              device="external", first_ms=ms, ms=dict.fromkeys(done, ms))
+    sequence.write_run(name, run)
+    return run
+
+
+def _split(command: str) -> list[str]:
+    try:
+        words = shlex.split(command)
+    except ValueError as error:
+        raise InputError(f"--external cannot be split into words ({error}): "
+                         "check its quotes") from None
+    if not all(any(place in word for word in words) for place in PLACES[:2]):
+        raise InputError("--external lacks {input} or {output}: "
+                         "write 'PROGRAM {input} {output} {frames}'")
+    return words
+
+
+def _filled(word: str, places: dict[str, str]) -> str:
+    for place, value in places.items():
+        word = word.replace(place, value)
+    return word
+
+
+def _run(words: list[str]) -> float:
+    """Wall time of a program in milliseconds; InputError where it fails."""
+    started = time.perf_counter()
+    try:
+        done = subprocess.run(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                              stderr=subprocess.PIPE, check=False)
+    except OSError as error:
+        raise InputError(f"{words[0]} could not be started ({error.strerror}): give a program "
+                         "that exists and may be run") from None
+    if done.returncode:
+        lines = done.stderr.decode(errors="replace").strip().splitlines()
+        said = "".join(c if c.isprintable() else "?" for c in lines[-1])[:300] if lines else ""
+        raise InputError(f"{words[0]} failed with exit code {done.returncode}"
+                         + (f", its last line was: {said}" if said else " and said nothing"))
+    return 1e3 * (time.perf_counter() - started)

@@ -1,0 +1,108 @@
+"""Times of several methods measured in turns, so that their ratios hold on a noisy machine.
+
+All methods get the same frames, from memory. In each step every method denoises one frame, and
+the order turns from step to step; the steps of the first round, in which kernels compile, are
+told apart. Ratios are of times of the same step, to the first method's.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import numpy as np
+from pydantic import FiniteFloat
+
+from render import backend
+from render.atomic import write_text
+from render.errors import InputError
+from render.json_file import JsonFile, format_json, read_json
+from render.sequence import Sequence
+
+from .demodulation import CHANNELS as TEXTURE
+from .methods import Method, parameters
+from .timing import timed
+
+
+class MethodTime(JsonFile):
+    """Milliseconds a frame: median and quartiles, and the same of the ratio to the first method."""
+
+    parameters: dict[str, Any]
+    first_ms: FiniteFloat
+    ms: FiniteFloat
+    ms_quartiles: tuple[FiniteFloat, FiniteFloat]
+    ratio: FiniteFloat
+    ratio_quartiles: tuple[FiniteFloat, FiniteFloat]
+
+
+class Times(JsonFile):
+    """times.json. steps: measurements of each method that count. ratio_to: the first method."""
+
+    size: tuple[int, int]
+    frames: int
+    steps: int
+    device: str
+    threads: int
+    machine: str
+    ratio_to: str
+    methods: dict[str, MethodTime]
+
+
+def time_methods(sequence: Sequence, methods: Mapping[str, Method], frames: int = 4,
+                 rounds: int = 5, on_step: Callable[[int], None] = lambda done: None) -> Times:
+    """Measure methods in turns, and write times.json into the sequence's folder.
+
+    Args:
+        frames: how many are denoised, from the first one on, again in every round.
+        rounds: how many count; one more goes before them.
+        on_step: told how many steps are done.
+
+    Raises:
+        InputError: no frames or methods, or a frame lacks a channel that a method needs.
+    """
+    numbers = [i for i in sequence.frames if sequence.has_frame(i)][:frames]
+    if not numbers or not methods or rounds < 1:
+        raise InputError(f"there is nothing to time in {sequence.folder}: "
+                         "it takes frames, methods, and a round")
+    needs = {c for method in methods.values() for c in method.needs}
+    needs |= {c for c in TEXTURE if c in sequence.manifest.channels}
+    loaded = [sequence.read_frame(i, sorted(needs)) for i in numbers]
+    names = list(methods)
+    states = {name: method.init(*sequence.size) for name, method in methods.items()}
+    ms: dict[str, list[float]] = {name: [] for name in names}
+    for step in range((rounds + 1) * len(loaded)):
+        frame, first = loaded[step % len(loaded)], step % len(names)
+        for name in names[first:] + names[:first]:
+            (_, states[name]), spent = timed(partial(methods[name], frame, states[name]))
+            ms[name].append(spent)
+        on_step(step + 1)
+    height, width = sequence.size
+    times = Times(size=(width, height), frames=len(loaded), steps=rounds * len(loaded),
+                  device=backend.choose(), threads=dr.thread_count(), machine=platform.machine(),
+                  ratio_to=names[0], methods=_summary(methods, ms, len(loaded)))
+    write_text(sequence.folder / "times.json", format_json(times))
+    return times
+
+
+def read_times(folder: Path) -> Times | None:
+    """The times in a sequence's folder, None if there are none; InputError if damaged."""
+    path = folder / "times.json"
+    return read_json(path, Times) if path.exists() else None
+
+
+def _summary(methods: Mapping[str, Method], ms: dict[str, list[float]],
+             warm_up: int) -> dict[str, MethodTime]:
+    base = np.array(next(iter(ms.values()))[warm_up:])
+    found = {}
+    for name, values in ms.items():
+        warm = np.array(values[warm_up:])
+        low, middle, high = np.quantile(warm, (0.25, 0.5, 0.75)).tolist()
+        ratio_low, ratio, ratio_high = np.quantile(warm / base, (0.25, 0.5, 0.75)).tolist()
+        found[name] = MethodTime(
+            parameters=parameters(methods[name]), first_ms=values[0], ms=middle,
+            ms_quartiles=(low, high), ratio=ratio, ratio_quartiles=(ratio_low, ratio_high))
+    return found

@@ -1,0 +1,50 @@
+"""What our methods share: a frame goes to lanes, is worked on there, and comes back."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from render.frame import Frame
+
+from .stencil import Float, Stencil
+from .surface import GUIDES, Surface, read_color, read_surface
+
+
+class OnLanes:
+    """A method whose kernels run over the lanes of a stencil, which its state holds.
+
+    Attributes:
+        reach: largest |dx|, |dy| of a tap.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("color", *GUIDES)
+
+    @property
+    def reach(self) -> int:
+        raise NotImplementedError
+
+    def init(self, height: int, width: int) -> Any:
+        """State before the first frame; InputError for an empty image."""
+        return self.init_on(Stencil(height, width, self.reach))
+
+    def init_on(self, stencil: Stencil) -> Any:
+        """State on a stencil that reaches at least `reach` pixels."""
+        raise NotImplementedError
+
+    def __call__(self, frame: Frame, state: Any) -> tuple[np.ndarray, Any]:
+        """(h, w, 3) denoised colour, and the state for the next frame.
+
+        Raises:
+            InputError: a channel is missing, the size is not the state's, or the frame has
+                other objects than the one before it.
+        """
+        color, surface = read_color(frame, state.stencil), read_surface(frame, state.stencil)
+        result, after = self.on_lanes(frame, color, surface, state)
+        return state.stencil.image(result), after
+
+    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
+                 state: Any) -> tuple[list[Float], Any]:
+        """The same from arrays of lanes to arrays of lanes, in place of the frame's colour."""
+        raise NotImplementedError

@@ -1,0 +1,44 @@
+"""The most memory that a piece of work needs, as the operating system counts it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+_STATUS, _RESET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
+
+
+class PeakMemory:
+    """Resident memory above what it was when this was made, at its highest between the two calls.
+
+        peak = PeakMemory()
+        peak.begin(); work(); peak.end()      # as often as wanted
+        peak.megabytes                        # None where the system does not tell (not Linux)
+
+    Memory that the process had freed and kept is not seen being used again.
+    """
+
+    def __init__(self) -> None:
+        self._before = _kilobytes("VmRSS")
+        self.megabytes: float | None = None
+
+    def begin(self) -> None:
+        """Forget the highest mark so far."""
+        try:
+            _RESET.write_text("5")
+        except OSError:
+            self._before = None
+
+    def end(self) -> None:
+        """Take note of the highest mark since `begin`."""
+        highest = _kilobytes("VmHWM")
+        if highest is not None and self._before is not None:
+            self.megabytes = max(self.megabytes or 0.0, (highest - self._before) / 1024)
+
+
+def _kilobytes(name: str) -> int | None:
+    try:
+        found = re.search(rf"^{name}:\s*(\d+) kB", _STATUS.read_text(), re.MULTILINE)
+    except OSError:
+        return None
+    return int(found[1]) if found else None

@@ -1,0 +1,167 @@
+"""The report of a scored sequence: a folder that opens in a browser, from disk, without a server.
+
+    report/index.html           figures, plots, table, viewer: everything but the pixels
+    report/data/KIND/.../0000.js    one packed image each (packed.py), loaded when looked at
+    report/scores.json, scores.csv
+
+KIND is `frame/CHANNEL`, `reference`, `denoised/METHOD` or `flip/METHOD`. Equal input gives an equal
+report; files of an older one are removed, others in the folder stay.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import jinja2
+import numpy as np
+
+from render.atomic import write_text
+from render.channels import RADIANCE
+from render.errors import InputError
+from render.sequence import Sequence
+
+from . import packed
+from .flip import flip_map
+from .metrics import METRICS, pair
+from .pictures import Progress, display_error
+from .provenance import provenance
+from .scorecard import INPUT, Scores
+from .summary import best_cells, highlights, page_data, table_data
+from .table import caption
+
+EDGES = np.logspace(-4, 0, 49)
+"""Edges of the bins of the histogram; errors below the first are in the first bin."""
+
+_SCRIPTS = ("format.js", "pixels.js", "plots.js", "charts.js", "view.js", "viewer.js",
+            "controls.js", "page.js")
+
+
+def write_report(sequence: Sequence, scores: Scores, channels: Iterable[str] | None = None,
+                 progress: Progress | None = None) -> Path:
+    """Write `report/` into the sequence's folder; the path of its index.html.
+
+    Args:
+        channels: of the frames to show beside colour; default: all that there are.
+        progress: called with (done, total, what).
+
+    Raises:
+        InputError: an unknown channel, or a file that cannot be read or written.
+    """
+    shown = _channels(sequence, channels)
+    folder = sequence.folder / "report"
+    histograms = {name: np.zeros(len(EDGES) - 1) for name in scores.methods}
+    ranges: dict[str, tuple[float, float]] = {}
+    written: set[Path] = set()
+    flips = _flip_frames(scores)
+    with ThreadPoolExecutor() as pool:
+        for n, frame in enumerate(scores.frames):
+            def write(job: tuple[str, np.ndarray, packed.Kind], frame: int = frame) -> Path:
+                key = f"{job[0]}/{frame:04d}"
+                path = folder / "data" / f"{key}.js"
+                write_text(path, packed.pack(key, job[1], job[2]))
+                return path
+
+            images = list(_images(sequence, scores, frame, shown))
+            known = {key: image for key, image, _ in images}
+            if frame in flips:
+                images += _flip_maps(known, scores.methods)
+            _measure(known, histograms, ranges)
+            written |= set(pool.map(write, images))
+            if progress:
+                progress(n + 1, len(scores.frames), "report")
+    shares = {name: [float(f"{x:.4g}") for x in counts / counts.sum()]
+              for name, counts in histograms.items() if counts.sum()}
+    data = page_data(sequence, scores, shown, ranges, shares, EDGES, flips)
+    write_text(folder / "scores.json", scores.json_text())
+    write_text(folder / "scores.csv", scores.csv_text())
+    for old in {*folder.glob("data/**/*.js")} - written:
+        old.unlink()
+    write_text(folder / "index.html", render_page(sequence, scores, data))
+    return folder / "index.html"
+
+
+def _channels(sequence: Sequence, wanted: Iterable[str] | None) -> list[str]:
+    there = [name for name in sequence.manifest.channels if name != "color"]
+    if wanted is None:
+        return there
+    names = list(wanted)
+    for name in names:
+        if name not in there and name != "color":
+            raise InputError(f"{sequence.folder} lacks the channel '{name}' (it has "
+                             f"{', '.join(sequence.manifest.channels)})")
+    return [name for name in there if name in names]
+
+
+def _images(sequence: Sequence, scores: Scores, frame: int,
+            channels: list[str]) -> Iterator[tuple[str, np.ndarray, packed.Kind]]:
+    """(where it belongs, image, how it is stored) of all images of a frame."""
+    images = sequence.read_frame(frame, ("color", *channels)).images
+    for name, image in images.items():
+        kind = (packed.WHOLE if name == "id" else
+                packed.RADIANCE if name in RADIANCE else packed.GUIDE)
+        yield f"frame/{name}", image, kind
+    if sequence.has_reference(frame):
+        yield "reference", sequence.read_reference(frame).color, packed.RADIANCE
+    for name in scores.methods:
+        if name != INPUT and sequence.has_result(name, frame):
+            yield f"denoised/{name}", sequence.read_result(name, frame), packed.RADIANCE
+
+
+def _flip_maps(images: dict[str, np.ndarray],
+               methods: Iterable[str]) -> Iterator[tuple[str, np.ndarray, packed.Kind]]:
+    for name in methods:
+        image = images.get(_where(name))
+        if image is not None:
+            a, b = pair(image, images["reference"]).srgb
+            yield f"flip/{name}", flip_map(a, b), packed.GUIDE
+
+
+def _flip_frames(scores: Scores) -> list[int]:
+    """Frames with maps of FLIP: those on which it was measured."""
+    if "flip" not in METRICS:
+        return []
+    return sorted({row.frame for method in scores.methods.values() for row in method.per_frame
+                   if row["flip"] is not None})
+
+
+def _where(name: str) -> str:
+    return "frame/color" if name == INPUT else f"denoised/{name}"
+
+
+def _measure(images: dict[str, np.ndarray], histograms: dict[str, np.ndarray],
+             ranges: dict[str, tuple[float, float]]) -> None:
+    """Add a frame's errors to the histograms, and widen the ranges of what has no unit range."""
+    for name, counts in histograms.items():
+        image = images.get(_where(name))
+        if image is not None and "reference" in images:
+            error = np.clip(display_error(image, images["reference"]), EDGES[0], EDGES[-1])
+            counts += np.histogram(error, EDGES)[0]
+    for name in ("depth", "position"):
+        image = images.get(f"frame/{name}")
+        if image is not None:
+            values = image[np.isfinite(image) & (image != 0)]
+            if values.size:
+                low, high = ranges.get(name, (np.inf, -np.inf))
+                ranges[name] = (min(low, float(values.min())), max(high, float(values.max())))
+
+
+def render_page(sequence: Sequence, scores: Scores, data: dict) -> str:
+    """The text of index.html."""
+    environment = jinja2.Environment(loader=jinja2.PackageLoader("denoise", "page"),
+                                     autoescape=True, undefined=jinja2.StrictUndefined,
+                                     trim_blocks=True, lstrip_blocks=True)
+    source = environment.loader
+    assert source is not None
+    def text(name: str) -> str:
+        return source.get_source(environment, name)[0]
+    columns, rows = table_data(scores)
+    return environment.get_template("page.html.j2").render(
+        scores=scores, about=sequence.manifest.about, tiles=highlights(scores),
+        caption=caption(scores), columns=columns, rows=rows, best=best_cells(scores, columns),
+        made=provenance(sequence, scores), style=text("page.css"),
+        script="\n".join(text(name) for name in _SCRIPTS),
+        # "<" would let a name in the data end the element that holds it.
+        data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"))

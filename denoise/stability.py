@@ -1,0 +1,71 @@
+"""Measures of change from frame to frame: one function and one row of `STABILITY` each.
+
+Symbols: a_t image and b_t reference of frame t, on the display (clipped sRGB); e_t = a_t - b_t;
+p a pixel, p' the pixel of frame t - 1 that shows p's surface (`correspondence.py`, exact).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from .correspondence import NOWHERE, carry
+from .metrics import METRICS, Metric, decibels, mse
+
+
+@dataclass(frozen=True)
+class Step:
+    """Two frames in a row of one method.
+
+    Attributes:
+        now, before: (image, reference), (h, w, 3) display values.
+        source: (h, w) of `correspondence.previous_pixel`, None without guides.
+        still: (h, w) mask of pixels where nothing has changed, None without guides.
+    """
+
+    now: tuple[np.ndarray, np.ndarray]
+    before: tuple[np.ndarray, np.ndarray]
+    source: np.ndarray | None
+    still: np.ndarray | None
+
+
+def flicker(step: Step) -> float | None:
+    """sqrt(mean((e_t(p) - e_{t-1}(p'))^2)) over pixels with a p'; None if there is none."""
+    if step.source is None or not (there := step.source != NOWHERE).any():
+        return None
+    error, old = (np.subtract(*images, dtype=np.float64) for images in (step.now, step.before))
+    return float(np.sqrt(np.mean(np.square(error - carry(old, step.source))[there])))
+
+
+def difference_psnr(step: Step) -> float:
+    """-10 log10(mean(((a_t - a_{t-1}) - (b_t - b_{t-1}))^2)) in dB, pixel by pixel, no motion."""
+    image, reference = (np.subtract(now, before, dtype=np.float64)
+                        for now, before in zip(step.now, step.before))
+    return decibels(mse(image, reference))
+
+
+def boiling(step: Step) -> float | None:
+    """sqrt(mean((a_t - a_{t-1})^2)) over still pixels; None if there is none."""
+    if step.still is None or not step.still.any():
+        return None
+    change = np.subtract(step.now[0], step.before[0], dtype=np.float64)
+    return float(np.sqrt(np.mean(np.square(change)[step.still])))
+
+
+_ROWS = (
+    Metric("flicker", "flicker", flicker, "step", "", False, ".4f",
+           "sqrt(mean((e_t(p) - e_{t-1}(p'))^2)), e = S(a) - S(b), p' the pixel of the frame "
+           "before that shows p's surface; a sequence's is the mean over its frames"),
+    Metric("psnr_difference", "PSNR of differences", difference_psnr, "step", "dB", True, ".2f",
+           "PSNR of S(a_t) - S(a_{t-1}) against S(b_t) - S(b_{t-1})", in_table=False),
+    Metric("boiling", "boiling", boiling, "step", "", False, ".4f",
+           "sqrt(mean((S(a_t) - S(a_{t-1}))^2)) where neither surface, camera nor light has "
+           "changed", in_table=False),
+)
+
+STABILITY = MappingProxyType({row.name: row for row in _ROWS})
+
+MEASURES = MappingProxyType({**METRICS, **STABILITY})
+"""All that is known of a frame of a method: `FrameScore` has a value for each row."""

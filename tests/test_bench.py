@@ -1,0 +1,47 @@
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import onespp
+from denoise.bench import KERNELS, max_error
+from denoise.methods import METHODS
+from denoise.probe import probe
+
+
+def test_the_command_prints_the_figures_of_every_kernel_as_json():
+    result = CliRunner().invoke(onespp.app, ["bench", "--size", "20x12", "--repeats", "2",
+                                             "--json", "-"])
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert (found["width"], found["height"], found["repeats"]) == (20, 12, 2)
+    assert found["bandwidth_gb_s"] > 0
+    assert found["arithmetic_gflop_s"] > 0
+    assert set(found["kernels"]) == set(KERNELS) <= set(METHODS)
+    for name, row in found["kernels"].items():
+        assert 0 < row["ms"] < 60_000, name
+        assert 0 < row["call_ms"] < 60_000, name
+        assert 0 <= row["max_error"] < 1e-2, name
+        if found["oidn_fast_ms"] is not None:
+            assert row["share_of_oidn_fast"] == pytest.approx(row["ms"] / found["oidn_fast_ms"])
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_every_kernel_is_near_its_formula_on_the_probe(name):
+    assert 0 < max_error(name) < 2e-3
+
+
+def test_the_probe_has_surfaces_background_and_motion():
+    first, second = probe(24, 32, 0), probe(24, 32, 1)
+    assert set(np.unique(first["id"])) == {-1, 0, 1}
+    assert (first["id"] != second["id"]).any()
+    assert (first.world_from_object[1] != second.world_from_object[1]).any()
+    surface = first["id"] >= 0
+    np.testing.assert_allclose(np.linalg.norm(first["normal"], axis=-1)[surface], 1, atol=1e-6)
+    world = np.concatenate([first["position"], np.ones((24, 32, 1))], -1)
+    screen = world @ first.screen_from_world.T
+    y, x = np.mgrid[:24, :32] + 0.5
+    there = screen[surface, :2] / screen[surface, 3:]
+    np.testing.assert_allclose(there, np.stack([x, y], -1)[surface], atol=1e-4)
+    np.testing.assert_allclose(screen[surface, 3], first["depth"][surface], rtol=1e-6)
