@@ -9,16 +9,8 @@ import click
 
 import render.command
 from denoise.bench_command import bench
-from denoise.command import (
-    DEFAULT_METHODS,
-    compare,
-    denoise,
-    denoise_in,
-    report,
-    score,
-    score_in,
-    time_,
-)
+from denoise.command import DEFAULT_METHODS, denoise, denoise_in, time_
+from denoise.score_command import compare, report, score, score_in
 from render.terminal import BAD_INPUT
 from render.terminal import run as run_command
 

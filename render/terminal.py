@@ -88,6 +88,19 @@ def progress() -> Iterator[Callable[[str, float], Steps]]:
         yield lambda title, total: Steps(title, total, bar)
 
 
+@contextmanager
+def named_progress() -> Iterator[Callable[[int, int, str], None]]:
+    """Yields `report(done, total, what)`; every new `what` is a part of the job."""
+    parts: dict[str, Steps] = {}
+    with progress() as begin:
+        def report(done: int, total: int, what: str) -> None:
+            if what not in parts:
+                parts[what] = begin(what, total)
+            parts[what].advance(done)
+
+        yield report
+
+
 def run(command: click.Command, arguments: Sequence[str] | None = None,
         name: str = "onespp") -> None:
     """Run a command line and exit: 0 done, 2 bad input, 130 interrupted.

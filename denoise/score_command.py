@@ -1,0 +1,108 @@
+"""The commands `score`, `report` and `compare`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from render.sequence import Sequence
+from render.terminal import named_progress
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--method", "methods", multiple=True, metavar="NAME",
+              help="Score these alone; default all that have results.")
+@click.option("--json", "json_to", metavar="FILE",
+              help="Also write the scores to FILE; - prints them instead of the table.")
+@click.option("--pictures/--no-pictures", default=True, show_default=True,
+              help="Draw contact sheets, plot and movie.")
+@click.option("--by-cause", is_flag=True,
+              help="Also show the error by cause (disoccluded, moving, ...) and by history.")
+@click.option("--seeds", multiple=True, type=click.Path(path_type=Path), metavar="DIR",
+              help="A render of the same with another --seed, denoised alike: splits the error "
+              "into bias and variance; may be given several times.")
+def score(folder: Path, methods: tuple[str, ...], json_to: str | None, pictures: bool,
+          by_cause: bool, seeds: tuple[Path, ...]) -> None:
+    """Score what the sequence in FOLDER holds; write scores.json, scores.csv and pictures."""
+    score_in(folder, methods, json_to, pictures, by_cause, seeds)
+
+
+def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = None,
+             pictures: bool = True, by_cause: bool = False, seeds: tuple[Path, ...] = ()) -> None:
+    """Do what the options of `score` ask."""
+    from render.atomic import write_text
+
+    from .score import score as score_sequence
+    from .table import print_classes, print_scores, print_splits
+
+    sequence = Sequence.open(folder)
+    others = [Sequence.open(other) for other in seeds]
+    with named_progress() as report:
+        scores = score_sequence(sequence, list(methods) or None, pictures, report, others)
+    if json_to == "-":
+        click.echo(scores.json_text(), nl=False)
+        return
+    if json_to:
+        write_text(Path(json_to), scores.json_text())
+    print_scores(scores)
+    if by_cause:
+        print_classes(scores)
+    if seeds:
+        print_splits(scores)
+    drawn = " and pictures/" if pictures else ""
+    click.echo(f"wrote {folder / 'scores.json'}, scores.csv{drawn}")
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--channels", metavar="NAMES",
+              help="Of the frames, as albedo,normal; default all. Fewer make a smaller folder.")
+def report(folder: Path, channels: str | None) -> None:
+    """Write a report of the scored sequence in FOLDER that opens in any browser."""
+    from .report import write_report
+    from .scorecard import read_scores
+
+    sequence = Sequence.open(folder)
+    if not (folder / "scores.json").exists():
+        score_in(folder)
+    names = channels and [name.strip() for name in channels.split(",") if name.strip()]
+    with named_progress() as tell:
+        page = write_report(sequence, read_scores(folder / "scores.json"), names or None, tell)
+    click.echo(f"wrote {page}: open it in a browser")
+
+
+@click.command()
+@click.argument("a", type=click.Path(path_type=Path))
+@click.argument("b", type=click.Path(path_type=Path))
+@click.option("--method", "methods", multiple=True, metavar="NAME",
+              help="Compare these alone; default all that both have.")
+@click.option("--threshold", "thresholds", multiple=True, metavar="NAME=LIMIT",
+              help="What may get worse by how much, as psnr_srgb=0.2, relmse=5% or ms=20%; may be "
+                   "given several times. Default psnr_srgb=0.1, other measures 2%, time any.")
+@click.option("--all", "show_all", is_flag=True, help="Also list what stayed the same.")
+@click.option("--json", "json_to", metavar="FILE",
+              help="Also write the comparison to FILE; - prints it instead of the table.")
+def compare(a: Path, b: Path, methods: tuple[str, ...], thresholds: tuple[str, ...],
+            show_all: bool, json_to: str | None) -> None:
+    """Compare the scores.json A with a later B; exit 1 if something got worse past a threshold.
+
+    Change by change, with its standard error over the frames that both have.
+    """
+    from render.atomic import write_text
+
+    from .compare import comparison, parse_thresholds, print_comparison
+    from .scorecard import read_scores
+
+    found = comparison(read_scores(a), read_scores(b), list(methods) or None,
+                       parse_thresholds(thresholds))
+    if json_to and json_to != "-":
+        write_text(Path(json_to), found.json_text())
+    if json_to == "-":
+        click.echo(found.json_text(), nl=False)
+    else:
+        print_comparison(found, show_all)
+    if found.failed:
+        sys.exit(1)
