@@ -18,7 +18,9 @@ scatter would cost five times as much, and in a frozen function it silently writ
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import gc
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -252,11 +254,25 @@ class Step:
         self._frozen = dr.freeze(function, state_fn=_sizes, warn_after=1000)
 
     def __call__(self, *arguments: Any) -> Any:
-        return self._frozen(*arguments)
+        with _no_collection():
+            return self._frozen(*arguments)
 
     @property
     def recordings(self) -> int:
         return self._frozen.n_recordings
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Keeps Python's cycle collector away: an array that it frees while Dr.Jit records a step ends
+    the process (`enqueue_host_func(): this function cannot be recorded`)."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def _sizes(*arguments: Any) -> tuple[int, ...]:

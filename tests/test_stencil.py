@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import drjit as dr
 import numpy as np
 import pytest
@@ -236,3 +239,39 @@ def test_timed_waits_for_kernels():
 def test_impossible_grids_are_refused(size, layout, words):
     with pytest.raises(InputError, match=words):
         Stencil(*size, 1, "llvm", layout)
+
+
+COLLECTED_WHILE_RECORDING = """
+import gc
+import denoise
+import drjit.llvm as llvm
+import numpy as np
+from denoise.stencil import Step
+
+class Cycle:
+    pass
+
+gc.disable()
+cycle = Cycle()
+cycle.itself, cycle.array = cycle, llvm.Float(np.arange(5.0)) + 1
+del cycle
+
+def step(arrays):
+    doubled = arrays[0] * 2
+    containers = [[] for _ in range(1000)]  # enough for the collector to run
+    return [doubled + len(containers)]
+
+gc.enable()
+recorded = Step(step)
+gc.set_threshold(500, 1, 1)
+print(recorded([llvm.Float(np.arange(3.0))])[0])
+assert gc.isenabled()
+"""
+
+
+def test_arrays_in_reference_cycles_are_not_freed_while_a_step_is_recorded():
+    """Dr.Jit aborts when one is, so this runs in a process of its own."""
+    done = subprocess.run([sys.executable, "-c", COLLECTED_WHILE_RECORDING], text=True, check=False,
+                          capture_output=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["[1000,", "1002,", "1004]"]
