@@ -33,7 +33,7 @@ def print_bench(result: Bench, console: Console | None = None) -> None:
 
 def caption(result: Bench) -> str:
     """What the numbers stand on."""
-    yardstick = ("Open Image Denoise is not installed (pip install 'onespp[oidn]')"
+    yardstick = ("Open Image Denoise is not installed (pip install pyoidn)"
                  if result.oidn_fast_ms is None else f"OIDN fast {result.oidn_fast_ms:.0f} ms")
     return (f"Medians of {result.repeats}, taking turns. ms: arrays to arrays; call: images to "
             f"images; first: compilation included. {yardstick}. Memory and arithmetic: share of "

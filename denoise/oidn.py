@@ -7,7 +7,7 @@ every method (`surface.repair`); guides that are not finite count as albedo 1 an
 lie in buffers that it reads in place, and the network is set up in `init`, so that a call is one
 copy of the inputs and the filter.
 
-`pip install 'onespp[oidn]'` brings it; `AVAILABLE` says whether it is there.
+`pip install pyoidn` brings it; `AVAILABLE` says whether it is there.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Oidn:
         """
         if not AVAILABLE:
             raise InputError("Open Image Denoise is not installed: "
-                             "run `pip install 'onespp[oidn]'`")
+                             "run `pip install pyoidn`")
         if height < 1 or width < 1:
             raise InputError(f"an image of {width}x{height} pixels is empty")
         return OidnState(height, width, self)
@@ -91,7 +91,7 @@ class OidnState:
             self._device = pyoidn.Device()
         except (ImportError, OSError) as error:
             raise InputError(f"Open Image Denoise does not load ({error}): "
-                             "run `pip install --force-reinstall 'onespp[oidn]'`") from error
+                             "run `pip install --force-reinstall pyoidn`") from error
         self.height, self.width, self._settings = height, width, settings
         self._device.set_int("numThreads", dr.thread_count())
         self._device.set_bool("setAffinity", False)  # it would pin threads that others share

@@ -47,7 +47,7 @@ def _packages() -> Iterator[Finding]:
             yield Finding(name, "ok", importlib.metadata.version(name))
         except importlib.metadata.PackageNotFoundError:
             yield Finding(name, "bad",
-                          f"not installed: run `{sys.executable} -m pip install onespp`")
+                          f"not installed: run `{sys.executable} -m pip install {name}`")
 
 
 def _llvm() -> Iterator[Finding]:

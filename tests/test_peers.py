@@ -48,7 +48,7 @@ def test_peers_have_names_of_their_own_and_build_without_what_they_need(monkeypa
 def test_without_the_package_a_sentence_says_how_to_get_it(monkeypatch):
     monkeypatch.setattr(oidn, "AVAILABLE", False)
     assert not PEERS["oidn-high"].available()
-    with pytest.raises(InputError, match=r"pip install 'onespp\[oidn\]'"):
+    with pytest.raises(InputError, match=r"pip install pyoidn"):
         build("oidn-high").init(4, 4)
 
 
