@@ -47,8 +47,8 @@ def run(scene: str, out: Path | None, methods: tuple[str, ...], device: str, thr
         reference_spp: int | None, **options) -> None:
     """Render SCENE with ground truth, denoise it and score the result."""
     render.command.use(device, threads)
-    sequence = render.command.render_to(scene, out, reference_spp=reference_spp or REFERENCE_SPP,
-                                        **options)
+    spp = REFERENCE_SPP if reference_spp is None else reference_spp
+    sequence = render.command.render_to(scene, out, reference_spp=spp, **options)
     denoise_in(sequence.folder, methods)
     score_in(sequence.folder)
 

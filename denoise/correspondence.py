@@ -17,6 +17,7 @@ import numpy as np
 
 from render.frame import Frame
 
+from .reprojection import world_motion
 from .surface import camera_from_screen
 
 GUIDES = ("normal", "depth", "id")
@@ -53,16 +54,6 @@ def previous_pixel(previous: Frame, current: Frame) -> np.ndarray:
         position = current["depth"].ravel()[at, None] * (u @ b.T)
         source[at] = _seen(previous, current, int(i), motion, position, at)
     return source.reshape(h, w)
-
-
-def world_motion(previous: np.ndarray, current: np.ndarray) -> np.ndarray | None:
-    """M' M^-1, exactly the identity for an object at rest; None if M cannot be inverted."""
-    if np.array_equal(previous, current):
-        return np.eye(4)
-    try:
-        return previous @ np.linalg.inv(current)
-    except np.linalg.LinAlgError:
-        return None
 
 
 def _seen(previous: Frame, current: Frame, i: int, motion: np.ndarray, position: np.ndarray,

@@ -42,6 +42,8 @@ def commands(sequence: Sequence, runs: dict[str, Run]) -> list[str]:
         if manifest.reference_spp:
             first += ["--reference-spp", str(manifest.reference_spp)]
             first += ["--antialias"] if manifest.reference_filter == "box" else []
+        first += ["--direct", manifest.direct] if manifest.direct != "mis" else []
+        first += ["--sampler", manifest.sampler] if manifest.sampler != "pcg" else []
     else:
         first = ["import", manifest.scene, "--format", manifest.source]
     lines = [[*first, "--out", folder]]

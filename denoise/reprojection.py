@@ -66,7 +66,7 @@ def motion_table(previous: Frame, current: Frame) -> np.ndarray:
     s_previous = np.linalg.inv(camera_from_screen(previous))
     world_from_camera = np.linalg.inv(current.camera_from_world)
     for i in range(min(count, len(previous.world_from_object))):
-        motion = _world_motion(previous.world_from_object[i], current.world_from_object[i])
+        motion = world_motion(previous.world_from_object[i], current.world_from_object[i])
         if motion is None:
             continue
         t = previous.camera_from_world @ motion @ world_from_camera
@@ -79,7 +79,7 @@ def motion_table(previous: Frame, current: Frame) -> np.ndarray:
     return table.astype(np.float32)
 
 
-def _world_motion(previous: np.ndarray, current: np.ndarray) -> np.ndarray | None:
+def world_motion(previous: np.ndarray, current: np.ndarray) -> np.ndarray | None:
     """M' M^-1, exactly the identity for an object at rest; None if M cannot be inverted."""
     if np.array_equal(previous, current):
         return np.eye(4)

@@ -7,8 +7,6 @@ Hence the first frames are read, denoised and written in turns, and only their t
 
 from __future__ import annotations
 
-import importlib.metadata
-import platform
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
@@ -24,6 +22,7 @@ from render import backend
 from render.frame import Frame
 from render.manifest import Run
 from render.sequence import Sequence
+from render.versions import versions
 
 from .demodulation import CHANNELS as TEXTURE
 from .memory import PeakMemory
@@ -123,7 +122,7 @@ def denoise_sequence(sequence: Sequence, method: Method, name: str,
     dr.flush_malloc_cache()  # so that this method's memory is seen, and not the last one's
     peak = PeakMemory()
     run = Run(method=name, parameters=parameters(method), device=backend.choose(),
-              threads=dr.thread_count(), versions=_versions())
+              threads=dr.thread_count(), versions=versions("drjit"))
     _remove_stale(sequence, run)
     frames = [i for i in sequence.frames if sequence.has_frame(i)]
     used = (*method.needs, *(c for c in TEXTURE if c in sequence.manifest.channels))
@@ -161,8 +160,3 @@ def _remove_stale(sequence: Sequence, run: Run) -> None:
         old = sequence.read_run(run.method)
         if (old.parameters, old.versions) != (run.parameters, run.versions):
             sequence.remove_results(run.method)
-
-
-def _versions() -> dict[str, str]:
-    return {name: importlib.metadata.version(name) for name in ("onespp", "drjit")} | {
-        "python": platform.python_version()}

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import importlib.metadata
-import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -22,6 +20,7 @@ from .manifest import Manifest
 from .reference import Progress, pass_sizes, render_reference
 from .renderer import Renderer
 from .sequence import Sequence as FrameSequence
+from .versions import versions
 
 SECONDS_BETWEEN_SAVES = 10.0
 
@@ -63,15 +62,8 @@ class RenderJob:
             direct=self.direct, sampler=self.sampler,
             reference_filter="box" if self.antialias else "centre",
             channels=tuple(self.channels), objects=self.scene.object_names,
-            device=backend.choose(), versions=versions(),
+            device=backend.choose(), versions=versions("mitsuba", "drjit", "numpy"),
             created=datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"))
-
-
-def versions() -> dict[str, str]:
-    """Versions of what decides a result."""
-    names = ("onespp", "mitsuba", "drjit", "numpy")
-    return {name: importlib.metadata.version(name) for name in names} | {
-        "python": platform.python_version()}
 
 
 def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-import render  # noqa: F401  (finds LLVM before anything imports Dr.Jit)
+import onespp  # finds LLVM before anything imports Dr.Jit
+import render.terminal
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -19,6 +20,20 @@ def games202() -> Path:
     if not folder.is_dir():
         pytest.skip("the GAMES202 box frames are not in ../shared/data/games202-box")
     return folder
+
+
+@pytest.fixture
+def call(capsys):
+    """Runs a command line in this process; returns (exit code, stdout, stderr)."""
+    def run(*arguments) -> tuple[int, str, str]:
+        code = 0
+        try:
+            render.terminal.run(onespp.app, [str(a) for a in arguments])
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+    return run
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

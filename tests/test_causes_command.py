@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from synthetic import make_frame, translation
 
-import onespp
-import render.terminal
 from denoise.classes import CAUSES, HISTORIES
 from denoise.score import score
 from denoise.stability import STABILITY
@@ -20,20 +18,6 @@ from render.sequence import Reference, Sequence
 
 H, W, COUNT = 24, 30, 4
 CHANNELS = ("color", "albedo", "normal", "position", "depth", "id")
-
-
-@pytest.fixture
-def call(capsys):
-    """Runs a command line in this process; returns (exit code, stdout, stderr)."""
-    def run(*arguments) -> tuple[int, str, str]:
-        code = 0
-        try:
-            render.terminal.run(onespp.app, [str(a) for a in arguments])
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-    return run
 
 
 @pytest.fixture

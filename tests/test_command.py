@@ -11,8 +11,6 @@ import time
 
 import pytest
 
-import onespp
-import render.terminal
 from render.sequence import Sequence
 
 SCENE = '''
@@ -28,20 +26,6 @@ def scene():
         Shape("lamp", Sphere(), diffuse((0, 0, 0)), translate((0, 4, 0)), (9.0, 9.0, 9.0)),
     ), Camera(look_at((0, 2, 6), (0, 1, 0))), frames=3, width=16, height=12)
 '''
-
-
-@pytest.fixture
-def call(capsys):
-    """Runs a command line in this process; returns (exit code, stdout, stderr)."""
-    def run(*arguments) -> tuple[int, str, str]:
-        code = 0
-        try:
-            render.terminal.run(onespp.app, [str(a) for a in arguments])
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-    return run
 
 
 @pytest.fixture
@@ -149,6 +133,7 @@ def test_running_again_with_more_frames_goes_on(call, scene_file, tmp_path):
     (("render", "box", "--device", "abacus"), ("abacus", "llvm")),
     (("render", "box", "--threads", "0"), ("0",)),
     (("render", "box", "--reference-spp", "1", "--size", "4x4"), ("2 spp",)),
+    (("run", "box", "--reference-spp", "0", "--size", "4x4"), ("2 spp",)),
     (("denoise", "nowhere"), ("nowhere", "onespp render")),
     (("score", "nowhere"), ("nowhere",)),
     (("export", "nowhere"), ("nowhere",)),

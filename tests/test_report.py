@@ -239,6 +239,17 @@ def test_an_unknown_channel_is_refused_by_name(reported):
         write_report(sequence, scores, ["glow"])
 
 
+def test_command_lines_name_the_estimator_and_sampler_that_are_not_the_default(reported):
+    sequence, _, _ = reported
+    plain = commands(sequence, {})[0]
+    assert "--direct" not in plain
+    assert "--sampler" not in plain
+    manifest = sequence.manifest.model_copy(update={"direct": "resampled", "sampler": "zsobol"})
+    other = commands(Sequence(sequence.folder, manifest), {})[0]
+    assert "--direct resampled" in other
+    assert "--sampler zsobol" in other
+
+
 def test_the_command_scores_first_where_there_are_no_scores(tmp_path):
     sequence = make_report_sequence(tmp_path / "made", frames=1)
     result = CliRunner().invoke(onespp.app, ["report", str(sequence.folder)])
