@@ -133,7 +133,7 @@ class Renderer:
                 jitter = sampler.next_2d()
                 ray, _ = rays.at(x + jitter.x - 0.5, y + jitter.y - 0.5)
                 pi = scene.ray_intersect_preliminary(ray, coherent=True)
-            radiance = trace(scene, ray, pi, sampler, self.scene.max_depth)
+            radiance = trace(scene, ray, pi, sampler, self.scene.max_depth, resampled=True)
             color += radiance.emission + radiance.direct + radiance.indirect
             sample += 1
         return color

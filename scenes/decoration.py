@@ -92,11 +92,6 @@ def lamp_stand(height: float = 1.45) -> Mesh:
                   (0, height + 0.055)], 32)
 
 
-def lamp_shade(bottom: float = 0.2, top: float = 0.12, height: float = 0.26) -> Mesh:
-    """A conical shade without thickness, open at both ends, its lower rim at y = 0."""
-    return lathe([(bottom, 0), (top, height)], 64)
-
-
 def plant_pot() -> Mesh:
     """A pot with earth in it."""
     return lathe([(0, 0), (0.13, 0), (0.13, 0), (0.18, 0.28), (0.2, 0.28), (0.2, 0.33), (0.2, 0.33),

@@ -42,12 +42,6 @@ def varnish(color: Texture, roughness: float = 0.2) -> dict[str, Any]:
         "int_ior": 1.5, "nonlinear": True, "diffuse_reflectance": color}}
 
 
-def translucent(color: Color) -> dict[str, Any]:
-    """Thin paper or cloth that lets half of the light through, for surfaces without thickness."""
-    return {"type": "principledthin", "base_color": color, "diff_trans": 1.0, "roughness": 1.0,
-            "eta": 1.0001, "spec_trans": 0.0}
-
-
 def metal(color: Color = (0.95, 0.93, 0.88), roughness: float = 0.15) -> dict[str, Any]:
     """A rough mirror whose reflectance at normal incidence is `color`."""
     return {"type": "twosided", "bsdf": {

@@ -1,7 +1,7 @@
 """A pink living room with toys: a camera that wanders through it, and much that moves.
 
 Metres, y up, x to the right, the sofa's wall at -z. The room is closed; its light comes from a
-panel in the ceiling and from the bulb of a floor lamp.
+panel in the ceiling and from the globe of a floor lamp.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def _shell() -> list[Shape]:
 
 
 def _lights() -> list[Shape]:
-    panel = translate((0, HEIGHT - 0.03, 0))
+    panel = translate((0, HEIGHT - 0.071, 0))  # flush: a lit rim would be a light unsampled
     lamp = translate((1.3, 0, -2.2))
     return [
         Shape("ceiling_light", Rectangle(), diffuse((0.0, 0.0, 0.0)),
@@ -83,10 +83,8 @@ def _lights() -> list[Shape]:
         Shape("ceiling_light_rim", decoration.rim(1.4, 1.0, 0.07, 0.04), diffuse(WHITE),
               translate((0, HEIGHT, 0))),
         Shape("lamp_stand", decoration.lamp_stand(), metal(rgb("#d6b27a"), 0.25), lamp),
-        Shape("lamp_shade", decoration.lamp_shade(), materials.translucent(rgb("#f0dcb8")),
-              lamp @ translate((0, 1.42, 0))),
-        Shape("lamp_bulb", Sphere(), diffuse((0.0, 0.0, 0.0)),
-              lamp @ translate((0, 1.56, 0)) @ scale(0.08), emission=(52.0, 38.0, 22.0)),
+        Shape("lamp_globe", Sphere(), diffuse((0.0, 0.0, 0.0)),
+              lamp @ translate((0, 1.6, 0)) @ scale(0.12), emission=(10.0, 7.2, 4.2)),
     ]
 
 
