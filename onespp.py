@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import click
@@ -11,7 +14,8 @@ import render.command
 from denoise.bench_command import bench
 from denoise.command import DEFAULT_METHODS, denoise, denoise_in, time_
 from denoise.score_command import compare, report, score, score_in
-from render.terminal import BAD_INPUT
+from denoise.tune_command import tune
+from render.terminal import BAD_INPUT, Steps, progress
 from render.terminal import run as run_command
 
 REFERENCE_SPP = 256
@@ -27,6 +31,7 @@ def app() -> None:
 def scenes() -> None:
     """List the scenes: frames, size, what moves."""
     from scenes import catalog
+    from scenes.hard import HARD
 
     for name in catalog.SCENES:
         scene = catalog.load(name)
@@ -34,6 +39,65 @@ def scenes() -> None:
                    f"    {scene.frames} frames of {scene.width}x{scene.height} at {scene.fps} fps, "
                    f"{len(scene.shapes)} shapes, paths of up to {scene.max_depth} segments\n"
                    f"    moves: {', '.join(scene.moving) or 'nothing'}")
+    click.echo("\nSmall scenes that each isolate one failure; `onespp hard` tries methods on them:")
+    for hard_one in HARD.values():
+        scene = hard_one.make()
+        click.echo(f"    {scene.name}: {scene.about}")
+
+
+@app.command()
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", default=Path("data/hard"),
+              show_default=True, help="Folder of the sequences.")
+@click.option("--reference-spp", type=int, default=REFERENCE_SPP, show_default=True, metavar="N",
+              help="Samples a pixel of the ground truth.")
+@render.command.device_option
+@render.command.threads_option
+def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
+         threads: int | None) -> None:
+    """Try every method on hard scenes (all, or those named), and print a table in Markdown.
+
+    Renders what is missing. For each scene and method: error, what its history gains, how soon it
+    recovers from a sudden change, and whether it keeps the energy.
+    """
+    render.command.use(device, threads)
+    from denoise.hard import markdown
+    from scenes import catalog
+    from scenes.hard import HARD
+
+    unknown = [name for name in names if name not in HARD]
+    if unknown:
+        catalog.load(f"hard/{unknown[0]}")  # says what there is
+    rows = []
+    with progress() as begin:
+        steps = begin("hard scenes", len(names or HARD))
+        for number, name in enumerate(names or HARD):
+            rows += _judge_hard(name, out, reference_spp, partial(_within, steps, number, name))
+    click.echo(markdown(rows))
+
+
+def _judge_hard(name: str, out: Path, reference_spp: int, advance: Callable[[float], None]) -> list:
+    """Rows of one hard scene; `advance` is told the share that is done."""
+    from denoise.hard import judge
+    from denoise.methods import METHODS
+    from render.job import RenderJob, render_sequence
+    from scenes.hard import HARD
+
+    hard = HARD[name]
+    scene = hard.make()
+    job = RenderJob(scene, range(scene.frames), scene.height, scene.width,
+                    reference_spp=reference_spp)
+    needed = {channel for method in METHODS.values() for channel in method.needs}
+    job = replace(job, channels=tuple(dict.fromkeys((*job.channel_names(), *sorted(needed)))))
+    sequence = render_sequence(job, out / name, on_references=lambda done, _: advance(
+        0.5 * done / scene.frames))
+    judged = iter(range(1, len(METHODS) + 2))
+    return judge(sequence, name, hard.event, hard.diffuse,
+                 lambda: advance(0.5 + 0.5 * next(judged) / (len(METHODS) + 1)))
+
+
+def _within(steps: Steps, number: int, name: str, part: float) -> None:
+    steps.advance(number + part, name)
 
 
 @app.command()
@@ -66,7 +130,7 @@ def doctor() -> None:
         sys.exit(BAD_INPUT)
 
 
-for command in (render.command.render, denoise, time_, score, report, compare, bench,
+for command in (render.command.render, denoise, time_, score, report, compare, bench, tune,
                 render.command.import_, render.command.export):
     app.add_command(command)
 

@@ -92,14 +92,13 @@ class Atrous(OnLanes):
         signal, guides = stencil.planes([0.0] * 4), stencil.planes([0.0] * 3 + [_OUTSIDE])
         level_taps = []
         for i in range(self.levels):
-            offsets = [(dy << i, dx << i) for dy, dx in _window(2)]
+            offsets = [(dy << i, dx << i) for dy, dx in (*_window(2), (0, 0))]
             level_taps.append((signal.taps(offsets), guides.taps(offsets)))
-        return AtrousState(
-            stencil, signal, guides, level_taps, signal.taps(_window(1)),
-            (signal.taps(_window(VARIANCE_RADIUS)), guides.taps(_window(VARIANCE_RADIUS))),
-            [stencil.opaque(1 << i) for i in range(self.levels)],
-            Step(estimate_variance), [Step(luminance_scale) for _ in range(self.levels)],
-            [Step(filter_level) for _ in range(self.levels)])
+        near = [*_window(VARIANCE_RADIUS), (0, 0)]
+        return AtrousState(stencil, signal, guides, level_taps, signal.taps(_window(1)),
+                           (signal.taps(near), guides.taps(near)),
+                           [stencil.opaque(1 << i) for i in range(self.levels)],
+                           Step(estimate_variance), [Step(level) for _ in range(self.levels)])
 
     def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
                  state: AtrousState) -> tuple[list[Float], AtrousState]:
@@ -111,26 +110,27 @@ class Atrous(OnLanes):
         inverse_depth = dr.select(surface.exists, surface.inverse_depth, float_t(BACKGROUND))
         scale = dr.select(surface.exists, dr.abs(surface.plane_distance)
                           * stencil.opaque(1 / self.sigma_plane), float_t(_BACKGROUND_SCALE))
-        guides = [*normal, inverse_depth, *surface.plane, scale]
+        guides, plane = [*normal, inverse_depth], [*surface.plane, scale]
         light = [light[0], luminance(light), light[2]]
-        dr.eval(light, guides)
-        state.guides.store(guides[:4])
+        dr.eval(light, guides, plane)
+        state.guides.store(guides)
         state.signal.store(light)
-        variance = state.variance_step(*state.variance_taps, light[1:2], guides)
+        signal = [*light, state.variance_step(*state.variance_taps, plane)]
+        state.signal.store(signal[3:], first=3)
         numbers = [stencil.opaque(EPSILON), stencil.opaque(self.sigma_luminance / LOG2E),
-                   stencil.opaque(LOG2E * self.normal_power)]
-        signal = [*light, variance]
+                   stencil.opaque(math.sqrt(LOG2E * self.normal_power / 2))]
         for i in range(self.levels):
-            state.signal.store(signal)
-            scale_of_l = state.scale_steps[i](state.blur_taps, signal[3:], numbers)
-            signal = state.level_steps[i](*state.level_taps[i], signal, guides,
-                                          [scale_of_l], [state.spacings[i], numbers[2]])
+            if i > 0:
+                state.signal.store(signal)
+            signal = state.level_steps[i](state.blur_taps, *state.level_taps[i], signal[3:], plane,
+                                          [state.spacings[i], *numbers])
         return texture.restore(with_green(signal)), state
 
 
 @dataclass(frozen=True)
 class AtrousState:
-    """Planes of the signal (r, l, b, variance) and of the guides (n, 1/z), and their taps."""
+    """Planes of the signal (r, l, b, variance) and of the guides (n, 1/z), and their taps: the
+    pixel itself is the last of a level's, and of those that variance is estimated from."""
 
     stencil: Stencil
     signal: Any
@@ -140,25 +140,26 @@ class AtrousState:
     variance_taps: tuple[Taps, Taps]
     spacings: list[Float]
     variance_step: Step
-    scale_steps: list[Step]
     level_steps: list[Step]
 
 
-def estimate_variance(signal: Taps, guides: Taps, center: list[Float],
-                      center_guides: list[Float]) -> Float:
+def estimate_variance(signal: Taps, guides: Taps, plane: list[Float]) -> Float:
     """Variance of the luminance over the taps within sigma_plane of the pixel's plane.
 
     Sums run over differences from the pixel itself, which keeps digits on bright pixels.
     """
-    (lum,), (_, _, _, inverse_depth, gx, gy, scale) = center, center_guides
+    gx, gy, scale = plane
+    lum, inverse_depth, limit = signal.at(-1)[1], guides.at(-1)[3], 1 / scale
     float_t = type(lum)
-    count, sum1, sum2 = float_t(1), float_t(0), float_t(0)
+    count, sum1, sum2, row = float_t(1), float_t(0), float_t(0), inverse_depth
     for i, (dy, dx) in enumerate(_window(VARIANCE_RADIUS)):
-        expected = dr.fma(gx, float(dx), dr.fma(gy, float(dy), inverse_depth))
-        on_plane = dr.abs(guides.at(i)[3] - expected) * scale < 1
-        d = dr.select(on_plane, signal.at(i)[1] - lum, 0)
-        count += dr.select(on_plane, float_t(1), 0)
-        sum1, sum2 = sum1 + d, dr.fma(d, d, sum2)
+        if dx == -VARIANCE_RADIUS:
+            row = dr.fma(gy, float(dy), inverse_depth)
+        distance = dr.abs(guides.at(i)[3] - dr.fma(gx, float(dx), row))
+        on_plane = dr.select(distance < limit, float_t(1), 0)
+        d = signal.at(i)[1] - lum
+        counted = d * on_plane
+        count, sum1, sum2 = count + on_plane, sum1 + counted, dr.fma(d, counted, sum2)
         signal.next()
     mean = sum1 / count
     variance = dr.fma(-mean, mean, sum2 / count)
@@ -167,34 +168,51 @@ def estimate_variance(signal: Taps, guides: Taps, center: list[Float],
 
 def luminance_scale(taps: Taps, variance: list[Float], numbers: list[Float]) -> Float:
     """log2(e) / (sigma_luminance sqrt(g3x3(v)) + eps)."""
-    epsilon, sigma, _ = numbers
+    epsilon, sigma, *_ = numbers
     blurred = variance[0] * BINOMIAL[0]**2
     for i, (dy, dx) in enumerate(_window(1)):
         blurred = dr.fma(taps.at(i)[3], BINOMIAL[abs(dy)] * BINOMIAL[abs(dx)], blurred)
     return 1 / dr.fma(sigma, dr.sqrt(blurred), epsilon)
 
 
-def filter_level(signal: Taps, guides: Taps, center: list[Float], center_guides: list[Float],
-                 scale_of_l: list[Float], numbers: list[Float]) -> list[Float]:
-    """One level: filtered r, l, b and variance. numbers: spacing, log2(e) normal_power."""
-    nx, ny, nz, inverse_depth, gx, gy, scale = center_guides
-    spacing, power = numbers
-    half_power = power * 0.5
-    gx, gy = gx * spacing, gy * spacing
-    lum, lum_scale = center[1], scale_of_l[0]
-    h0 = SPLINE[0]**2
+def level(blur: Taps, signal: Taps, guides: Taps, variance: list[Float], plane: list[Float],
+          numbers: list[Float]) -> list[Float]:
+    """One level: filtered r, l, b and variance.
+
+    In two kernels: one alone would not find room in the registers.
+    """
+    spacing, epsilon, sigma, q = numbers
+    scale_of_l = luminance_scale(blur, variance, [epsilon, sigma])
+    dr.eval(scale_of_l)
+    return filter_level(signal, guides, plane, scale_of_l, spacing, q)
+
+
+def filter_level(signal: Taps, guides: Taps, plane: list[Float], scale_of_l: Float, spacing: Float,
+                 q: Float) -> list[Float]:
+    """Mean of the taps by weight. q: sqrt(log2(e) normal_power / 2), so that with u = q t the
+    exponent of the normals is u (u + 2 q).
+
+    The pixel's own values are read from the planes too, where its neighbours have brought them
+    into the cache. What waits in a register counts: a vector on the stack, across two cache lines
+    as it may lie, costs a level up to half its time.
+    """
+    red, lum, blue, variance = signal.at(-1)
+    *normal, inverse_depth = guides.at(-1)
+    nx, ny, nz = (-q * n for n in normal)
+    gx, gy, scale = plane[0] * spacing, plane[1] * spacing, plane[2] * LOG2E
+    two_q, h0 = 2 * q, SPLINE[0]**2
     total = type(lum)(h0)
-    r, y, b, v = [c * h0 for c in center[:3]] + [center[3] * h0**2]
+    r, y, b, v = red * h0, lum * h0, blue * h0, variance * h0**2
+    row = inverse_depth
     for i, (dy, dx) in enumerate(_window(2)):
         tr, ty, tb, tv = signal.at(i)
         tnx, tny, tnz, tap_inverse_depth = guides.at(i)
-        t = dr.fma(-nx, tnx, dr.fma(-ny, tny, dr.fma(-nz, tnz, 1)))
-        expected = dr.fma(gx, float(dx), dr.fma(gy, float(dy), inverse_depth))
-        log2_h = math.log2(SPLINE[abs(dy)] * SPLINE[abs(dx)])
-        e = dr.fma(-t, dr.fma(t, half_power, power), log2_h)
-        e = dr.fma(dr.abs(tap_inverse_depth - expected), -scale, e)
-        e = dr.fma(dr.abs(ty - lum), -lum_scale, e)
-        w = exp2(e)
+        if dx == -2:
+            row = dr.fma(gy, float(dy), inverse_depth)
+        u = dr.fma(nx, tnx, dr.fma(ny, tny, dr.fma(nz, tnz, q)))
+        e = dr.fma(-u, u + two_q, math.log2(SPLINE[abs(dy)] * SPLINE[abs(dx)]))
+        e = dr.fma(dr.abs(tap_inverse_depth - dr.fma(gx, float(dx), row)), -scale, e)
+        w = exp2(dr.fma(dr.abs(ty - lum), -scale_of_l, e))
         r, y, b, total = dr.fma(w, tr, r), dr.fma(w, ty, y), dr.fma(w, tb, b), total + w
         v = dr.fma(w * w, tv, v)
         signal.next()

@@ -7,13 +7,15 @@ Open Image Denoise's fast quality, as a method too, with albedo and normal.
 
 The shares of bandwidth and of arithmetic set the least that a kernel can do, counted by hand from
 the code below, against what `limits.py` has measured; the greater of the two says what bounds it.
+`speed_up` is the kernel's time with one thread over `ms`. `peak_mb` is what a state and a call need
+at their highest, without the frame and the image; `bytes_a_pixel` the same over the pixels.
 """
 
 from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any
@@ -33,7 +35,7 @@ from .timing import timed
 
 WARM_UP, FRAMES = 3, 4
 CROP = (40, 56)  # height, width of the frames for the error
-_BILATERAL_TAP, _ATROUS_TAP = 62, 49  # operations, an FMA being two
+_BILATERAL_TAP, _ATROUS_TAP = 63, 42  # operations, an FMA being two
 
 
 @dataclass(frozen=True)
@@ -55,8 +57,8 @@ def _accumulated(previous: Frame, frame: Frame, old: np.ndarray, new: np.ndarray
     return oracles.accumulate(new, oracles.reproject_bilinear(previous, frame, old))
 
 
-_ATROUS = (5 * (24 * _ATROUS_TAP + 17) + 48 * 13, 4 * (5 * 35 + 27))
-_TEMPORAL = (600, 4 * 60)
+_ATROUS = (5 * (24 * _ATROUS_TAP + 17) + 48 * 12, 4 * (5 * 27 + 38))
+_TEMPORAL = (1150, 4 * 39)
 
 KERNELS = {
     "bilateral": Kernel(33 * 33 * _BILATERAL_TAP, 4 * 33 * 29,
@@ -75,7 +77,10 @@ KERNELS = {
 
 @dataclass(frozen=True)
 class Row:
-    """Milliseconds and shares of one kernel; None where there is no yardstick."""
+    """Milliseconds, shares and memory of one kernel.
+
+    None where there is no yardstick, or no second thread.
+    """
 
     ms: float
     call_ms: float
@@ -85,6 +90,9 @@ class Row:
     max_error: float
     share_of_bandwidth: float
     share_of_arithmetic: float
+    speed_up: float | None
+    peak_mb: float
+    bytes_a_pixel: float
 
 
 @dataclass(frozen=True)
@@ -117,6 +125,7 @@ def bench(height: int, width: int, repeats: int,
         for run in (network, *runs.values()):
             if run:
                 run.measure(i % FRAMES)
+        measure_one_thread(runs.values(), i % FRAMES)
         on_step(2 + i, total)
     oidn = median(network.ms) if network else None
     bandwidth, arithmetic = limits.memory_bandwidth(), limits.arithmetic()
@@ -126,10 +135,44 @@ def bench(height: int, width: int, repeats: int,
         per_ms = height * width / ms * 1e-6  # times operations or bytes a pixel: giga a second
         rows[name] = Row(ms, call, run.first_ms, oidn and ms / oidn, oidn and call / oidn,
                          max_error(name), kernel.bytes * per_ms / bandwidth,
-                         kernel.operations * per_ms / arithmetic)
+                         kernel.operations * per_ms / arithmetic,
+                         median(run.one_thread_ms) / ms if run.one_thread_ms else None,
+                         run.peak_mb, run.peak_mb * 2**20 / (height * width))
     on_step(total, total)
     return Bench(rows, width, height, repeats, oidn, bandwidth, arithmetic, backend.choose(),
                  dr.thread_count(), platform.processor() or platform.machine())
+
+
+SIZES = ((256, 256), (512, 512), (720, 1280), (1080, 1920))
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """Kernels at several sizes ("WxH"): milliseconds of each, and of Open Image Denoise."""
+
+    sizes: list[str]
+    repeats: int
+    ms: dict[str, list[float]]
+
+    def json_text(self) -> str:
+        return json.dumps(asdict(self), indent=2) + "\n"
+
+
+def scaling(repeats: int, on_step: Callable[[int, int], None] = lambda done, total: None,
+            sizes: Sequence[tuple[int, int]] = SIZES) -> Scaling:
+    """Measure every kernel at each (height, width), in turns."""
+    found: dict[str, list[float]] = {}
+    for done, (height, width) in enumerate(sizes, 1):
+        runs: dict[str, Any] = {name: _Run(name, height, width) for name in KERNELS}
+        if AVAILABLE:
+            runs["OIDN fast"] = _Network(height, width)
+        for i in range(repeats):
+            for run in runs.values():
+                run.measure(i % FRAMES)
+        for name, run in runs.items():
+            found.setdefault(name, []).append(median(run.ms))
+        on_step(done, len(sizes))
+    return Scaling([f"{width}x{height}" for height, width in sizes], repeats, found)
 
 
 def max_error(name: str) -> float:
@@ -139,6 +182,19 @@ def max_error(name: str) -> float:
     _, state = method(previous, method.init(*CROP))
     image, _ = method(frame, state)
     return float(np.abs(image - KERNELS[name].expected(previous, frame)).max())
+
+
+def measure_one_thread(runs: Iterable[_Run], i: int) -> None:
+    """The kernels' times with one thread, where there are more."""
+    threads = dr.thread_count()
+    if threads < 2 or backend.choose() != "llvm":
+        return
+    try:
+        dr.set_thread_count(1)
+        for run in runs:
+            run.one_thread_ms.append(run.measure_kernel(i))
+    finally:
+        dr.set_thread_count(threads)
 
 
 class _Run:
@@ -151,15 +207,21 @@ class _Run:
         self.state, self.kernel_state = (self.method.init(height, width) for _ in range(2))
         self.ms: list[float] = []
         self.call_ms: list[float] = []
+        self.one_thread_ms: list[float] = []
         self.first_ms = timed(lambda: self.method(self.frames[0], self.state))[1]
         for i in range(WARM_UP):
             self.measure(i)
         self.ms.clear()
         self.call_ms.clear()
+        self.peak_mb = self._peak(height, width)
 
     def measure(self, i: int) -> None:
         (_, self.state), ms = timed(lambda: self.method(self.frames[i], self.state))
         self.call_ms.append(ms)
+        self.ms.append(self.measure_kernel(i))
+
+    def measure_kernel(self, i: int) -> float:
+        """Milliseconds from arrays to arrays."""
         stencil = self.kernel_state.stencil
         color, surface = read_color(self.bare[i], stencil), read_surface(self.bare[i], stencil)
         dr.eval(color, surface)
@@ -170,7 +232,21 @@ class _Run:
             return result
 
         (_, self.kernel_state), ms = timed(kernel)
-        self.ms.append(ms)
+        return ms
+
+    def _peak(self, height: int, width: int) -> float:
+        """Dr.Jit's arrays at their highest, and the planes, which are not Dr.Jit's."""
+        dr.sync_thread()
+        dr.flush_malloc_cache()
+        dr.detail.malloc_clear_statistics()
+        state = self.method.init(height, width)
+        kind = state.stencil.backend
+        before = dr.detail.malloc_watermark(kind)
+        for frame in self.frames[:2]:
+            _, state = self.method(frame, state)
+            dr.sync_thread()
+        arrays = dr.detail.malloc_watermark(kind) - before
+        return (arrays + state.stencil.plane_bytes) / 2**20
 
 
 class _Network:

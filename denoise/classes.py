@@ -3,7 +3,10 @@
 Each pixel is in the first of these classes that it fits (`CAUSES`, and `about` below), and in one
 class of history length: for how many frames in a row its surface has been seen, this one included.
 
-There is no class of glossy pixels: no channel says how glossy a surface is.
+The order is from what leaves a method the least to go on. Without a history nothing else matters.
+Reflections come before motion, light and edges, for what is seen in a glossy surface moves, changes
+and has edges of its own, which the surface's matrix and guides do not tell: their error has that
+cause, wherever the surface is. A frame without the channel `roughness` has no glossy pixels.
 """
 
 from __future__ import annotations
@@ -21,9 +24,10 @@ from .luminance import luminance
 CAUSES = MappingProxyType({
     "background": "there is no surface",
     "disoccluded": "the surface was not seen in the frame before",
+    "glossy": "reflections are seen in the surface: a glossy lobe with a GGX alpha of at most 0.25",
     "moving": "the object's matrix has changed",
     "light": "the reference has changed along the motion, in a 5x5 window, by more than 5 % and "
-             "4 standard deviations of its noise: moving shadows, lights and reflections",
+             "4 standard deviations of its noise: moving shadows, lights and dull reflections",
     "edge": "another object, or a normal more than 26 degrees off, in the 3x3 window",
     "static": "none of the above",
 })
@@ -31,6 +35,7 @@ BACKGROUND = 0
 HISTORIES = MappingProxyType({"1": 1, "2-3": 2, "4-7": 4, "8-15": 8, "16+": 16})
 """Class -> its shortest history, frames."""
 
+MOST_ROUGH = 0.25
 LIGHT_WINDOW, LIGHT_CHANGE, LIGHT_SIGMAS = 2, 0.05, 4.0
 _SMALLEST_ALBEDO = 0.01
 
@@ -42,8 +47,8 @@ def causes(previous: Frame, current: Frame, source: np.ndarray, lit: np.ndarray)
         source: `correspondence.previous_pixel`. lit: `changed_light`.
     """
     surface = has_surface(current)
-    tests = (~surface, source == NOWHERE, moving(previous, current), lit, near_edge(current),
-             np.ones_like(surface))
+    tests = (~surface, source == NOWHERE, glossy(current), moving(previous, current), lit,
+             near_edge(current), np.ones_like(surface))
     return np.argmax(np.stack(tests), axis=0)
 
 
@@ -76,6 +81,13 @@ def changed_light(previous: Frame, current: Frame, before: Reference, now: Refer
     level = _window_sum(np.where(known, np.maximum(l1, old), 0)) / count
     sigma = np.sqrt(_window_sum(np.where(known, v1 + old_variance, 0))) / count
     return known & (change > LIGHT_CHANGE * level) & (change > LIGHT_SIGMAS * sigma)
+
+
+def glossy(frame: Frame) -> np.ndarray:
+    """(h, w) mask: the surface shows reflections; none where frames lack `roughness`."""
+    if "roughness" not in frame:
+        return np.zeros((frame.height, frame.width), bool)
+    return frame["roughness"] <= MOST_ROUGH
 
 
 def near_edge(frame: Frame) -> np.ndarray:

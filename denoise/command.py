@@ -8,12 +8,16 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
+from render.channels import REPLAY
 from render.command import device_option, threads_option, use
 from render.errors import InputError
+from render.lock import writing
 from render.sequence import Sequence
-from render.terminal import progress
+from render.terminal import command_line, progress
 
-DEFAULT_METHODS = ("assignment",)
+from .parameters import pairs
+
+DEFAULT_METHODS = ("onespp",)
 
 
 @click.command()
@@ -23,6 +27,9 @@ DEFAULT_METHODS = ("assignment",)
               "given several times.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE",
               help="A parameter of the method; may be given several times.")
+@click.option("--outliers", type=float, metavar="K",
+              help="Before the method, clamp each pixel to K "
+              "deviations from the mean of its neighbours on the same surface, as 3.")
 @click.option("--name", metavar="NAME", help="Name of the results; default the method's.")
 @click.option("--list", "list_methods", is_flag=True, is_eager=True, expose_value=False,
               callback=lambda context, _, chosen: chosen and _list(context),
@@ -34,21 +41,21 @@ DEFAULT_METHODS = ("assignment",)
 @threads_option
 @click.pass_context
 def denoise(context: click.Context, folder: Path, methods: tuple[str, ...],
-            settings: tuple[str, ...], name: str | None, external: str | None, device: str,
-            threads: int | None) -> None:
+            settings: tuple[str, ...], outliers: float | None, name: str | None,
+            external: str | None, device: str, threads: int | None) -> None:
     """Denoise the sequence in FOLDER."""
     use(device, threads)
     if external is not None:
         given = context.get_parameter_source("methods") != ParameterSource.DEFAULT
-        if given or settings or not name:
-            raise InputError("--external takes --name, and no --method or --set")
+        if given or settings or outliers is not None or not name:
+            raise InputError("--external takes --name, and no --method, --set or --outliers")
         _denoise_externally(folder, external, name)
         return
-    denoise_in(folder, methods, settings, name)
+    denoise_in(folder, methods, settings, name, outliers)
 
 
 def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...] = (),
-               name: str | None = None) -> None:
+               name: str | None = None, outliers: float | None = None) -> None:
     """Do what the options of `denoise` ask."""
     from .methods import build
     from .stream import denoise_sequence
@@ -57,20 +64,30 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
     chosen = _names(methods)
     if name and len(chosen) > 1:
         raise InputError(f"--name {name} is one name for {len(chosen)} methods: give one --method")
-    denoisers = [(method, build(method, _pairs(settings))) for method in chosen]
+    denoisers = {name or (method if outliers is None else f"{method}+outliers"):
+                 build(method, pairs(settings), outliers) for method in chosen}
+    for name, denoiser in denoisers.items():
+        if set(REPLAY) & set(denoiser.needs) - set(sequence.manifest.channels):
+            raise InputError(f"{name} needs the channels {' and '.join(REPLAY)}, which {folder} "
+                             "lacks: render it with --channels +gradient")
     frames = sum(map(sequence.has_frame, sequence.frames))
     if not frames:
         raise InputError(f"{folder} has no frames yet: render some first")
-    paces = {}
+    paces, runs = {}, {}
     with progress() as begin:
-        for method, denoiser in denoisers:
-            steps = begin(f"denoise {name or method}", frames)
-            denoise_sequence(sequence, denoiser, name or method,
-                             lambda done, ms, steps=steps: steps.advance(done, f"({ms:.0f} ms)"),
-                             partial(paces.__setitem__, name or method))
-    for method, pace in paces.items():
-        click.echo(f"{method}: {pace}")
-    click.echo(f"denoised {frames} frames by {', '.join(name or m for m in chosen)} "
+        for name, denoiser in denoisers.items():
+            steps = begin(f"denoise {name}", frames)
+            with writing(folder, f"denoise-{name}"):
+                runs[name] = denoise_sequence(
+                    sequence, denoiser, name,
+                    lambda done, ms, steps=steps: steps.advance(done, f"({ms:.0f} ms)"),
+                    partial(paces.__setitem__, name), command_line())
+    for name, pace in paces.items():
+        click.echo(f"{name}: {pace}")
+    for name, run in runs.items():
+        if run.energy_kept is not None:
+            click.echo(f"{name}: removing outliers took {1 - run.energy_kept:.2%} of the energy")
+    click.echo(f"denoised {frames} frames by {', '.join(runs)} "
                f"into {sequence.folder / 'denoised'}")
 
 
@@ -78,7 +95,8 @@ def _denoise_externally(folder: Path, command: str, name: str) -> None:
     from .external import denoise_externally
 
     sequence = Sequence.open(folder)
-    run = denoise_externally(sequence, command, name)
+    with writing(folder, f"denoise-{name}"):
+        run = denoise_externally(sequence, command, name, command_line())
     click.echo(f"denoised {len(run.ms)} frames by {name} into {sequence.folder / 'denoised'} "
                f"({run.first_ms:.0f} ms a frame, files included)")
 
@@ -102,9 +120,9 @@ def time_(folder: Path, methods: tuple[str, ...], frames: int, rounds: int, devi
 
     sequence = Sequence.open(folder)
     chosen = {name: build(name) for name in _names(methods)}
-    with progress() as begin:
+    with writing(folder, "time"), progress() as begin:
         steps = begin("time", (rounds + 1) * min(frames, len(sequence.frames)))
-        times = time_methods(sequence, chosen, frames, rounds, steps.advance)
+        times = time_methods(sequence, chosen, frames, rounds, steps.advance, command_line())
     for name, t in times.methods.items():
         click.echo(f"{name}: {t.ms:.1f} ms ({t.ms_quartiles[0]:.1f} to {t.ms_quartiles[1]:.1f}), "
                    f"{t.ratio:.2f} times {times.ratio_to} ({t.ratio_quartiles[0]:.2f} to "
@@ -121,16 +139,6 @@ def _names(methods: tuple[str, ...]) -> list[str]:
     groups = {"all": [*METHODS, *(name for name, peer in PEERS.items() if peer.available())],
               "oidn": [f"oidn-{quality}" for quality in QUALITIES]}
     return list(dict.fromkeys(name for m in methods for name in groups.get(m, [m])))
-
-
-def _pairs(settings: tuple[str, ...]) -> dict[str, str]:
-    pairs = {}
-    for setting in settings:
-        key, equals, value = setting.partition("=")
-        if not (key and equals and value):
-            raise InputError(f"--set {setting} is not understood: use NAME=VALUE, as in alpha=0.1")
-        pairs[key.strip()] = value.strip()
-    return pairs
 
 
 def _list(context: click.Context) -> None:

@@ -47,7 +47,7 @@ def previous_pixel(previous: Frame, current: Frame) -> np.ndarray:
     b = camera_from_screen(current)
     for i in np.unique(ids[ids >= 0]):
         motion = world_motion(previous.world_from_object[i], current.world_from_object[i])
-        if motion is None:
+        if motion is None or np.linalg.det(motion[:3, :3]) == 0:  # to or from no size at all
             continue
         at = np.flatnonzero(ids == i)
         u = np.stack([at % w + 0.5, at // w + 0.5, np.ones(at.size)], axis=-1)

@@ -29,8 +29,8 @@ def cost(sequence: Sequence, run: Run | None, times: Times | None) -> dict[str, 
     return {"ms_per_frame": warm, "first_ms": run.first_ms, "interleaved": interleaved,
             "startup_ms": startup(ms), "peak_mb": run.peak_mb,
             "megapixels_per_s": width * height / warm / 1e3 if warm else None,
-            "device": run.device, "threads": run.threads, "parameters": run.parameters,
-            "versions": run.versions}
+            "device": run.device, "machine": run.machine, "threads": run.threads,
+            "parameters": run.parameters, "versions": run.versions}
 
 
 def startup(ms: list[float]) -> float | None:

@@ -11,6 +11,7 @@ mirror, in renderers that write 0 there) counts as albedo 1.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import numpy as np
@@ -25,10 +26,14 @@ SMALLEST_ALBEDO = 1e-2
 
 @dataclass(frozen=True)
 class Texture:
-    """What was taken out, as arrays of lanes; empty lists: nothing."""
+    """What was taken out, as arrays of lanes; empty lists: nothing.
+
+    black: mask of surfaces darker than the floor, None where there is no albedo.
+    """
 
     albedo: list[Float]
     emission: list[Float]
+    black: Any = None
 
     def remove(self, color: list[Float]) -> list[Float]:
         light = [c - e for c, e in zip(color, self.emission)] if self.emission else color
@@ -49,9 +54,10 @@ def read_texture(frame: Frame, stencil: Stencil, wanted: bool) -> Texture:
     albedo = stencil.load(np.asarray(frame["albedo"], np.float32))
     albedo = [dr.select(dr.abs(a) < 1e6, a, 1) for a in albedo]
     dark = [a < SMALLEST_ALBEDO for a in albedo]
-    floor = dr.select(dark[0] & dark[1] & dark[2], stencil.Float(1), SMALLEST_ALBEDO)
+    black = dark[0] & dark[1] & dark[2]
+    floor = dr.select(black, stencil.Float(1), SMALLEST_ALBEDO)
     albedo = [dr.select(d, floor, a) for d, a in zip(dark, albedo)]
     if "emission" not in frame:
-        return Texture(albedo, [])
+        return Texture(albedo, [], black)
     emission = stencil.load(np.asarray(frame["emission"], np.float32))
-    return Texture(albedo, [dr.select(dr.abs(e) < 1e18, e, 0) for e in emission])
+    return Texture(albedo, [dr.select(dr.abs(e) < 1e18, e, 0) for e in emission], black)

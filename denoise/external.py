@@ -15,15 +15,19 @@ from pathlib import Path
 
 from render.errors import InputError
 from render.games202 import export_games202, import_result
+from render.machine import machine
 from render.manifest import Run, check_name
 from render.sequence import Sequence
+from render.terminal import readable
 
 PLACES: tuple[str, ...] = ("{input}", "{output}", "{frames}")
 
 
-def denoise_externally(sequence: Sequence, command: str, name: str) -> Run:
+def denoise_externally(sequence: Sequence, command: str, name: str, typed: str = "") -> Run:
     """Export the frames, run the program, import its results as those of the method `name`.
 
+    Args:
+        command: of the program. typed: our own command line, for run.json.
     Returns:
         The run. Its time a frame is the program's wall time, with its start and its reading and
         writing of files, over the number of frames: the same for all of them.
@@ -44,8 +48,9 @@ def denoise_externally(sequence: Sequence, command: str, name: str) -> Run:
         ms = _run([_filled(word, places) for word in words]) / len(sequence.frames)
         sequence.remove_results(name)
         done = import_result(sequence, made, name)
-    run = Run(method=name, parameters={"external": command, "timing": "whole program, with files"},
-              device="external", first_ms=ms, ms=dict.fromkeys(done, ms))
+    said = {"external": readable(command), "timing": "whole program, with files"}
+    run = Run(method=name, parameters=said, device="external", machine=machine(), command=typed,
+              first_ms=ms, ms=dict.fromkeys(done, ms))
     sequence.write_run(name, run)
     return run
 

@@ -34,7 +34,7 @@ class Ground:
 
 def read_ground(sequence: Sequence, number: int, before: Ground | None) -> tuple[Ground, Frame]:
     """The ground of a frame, and the frame itself. `before`: of the frame before, None if none."""
-    wanted = ("color", *GUIDES, "albedo")
+    wanted = ("color", *GUIDES, "albedo", "roughness")
     frame = sequence.read_frame(number, [c for c in wanted if c in sequence.manifest.channels])
     reference = sequence.read_reference(number) if sequence.has_reference(number) else None
     guided = all(name in frame for name in GUIDES)

@@ -7,7 +7,6 @@ told apart. Ratios are of times of the same step, to the first method's.
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -21,10 +20,10 @@ from render import backend
 from render.atomic import write_text
 from render.errors import InputError
 from render.json_file import JsonFile, format_json, read_json
+from render.machine import machine
 from render.sequence import Sequence
 
-from .demodulation import CHANNELS as TEXTURE
-from .methods import Method, parameters
+from .methods import Method, channels_read, parameters
 from .timing import timed
 
 
@@ -40,7 +39,12 @@ class MethodTime(JsonFile):
 
 
 class Times(JsonFile):
-    """times.json. steps: measurements of each method that count. ratio_to: the first method."""
+    """times.json.
+
+    Attributes:
+        steps: measurements of each method that count. ratio_to: the first method.
+        command: the command line, as it was typed.
+    """
 
     size: tuple[int, int]
     frames: int
@@ -48,18 +52,21 @@ class Times(JsonFile):
     device: str
     threads: int
     machine: str
+    command: str = ""
     ratio_to: str
     methods: dict[str, MethodTime]
 
 
 def time_methods(sequence: Sequence, methods: Mapping[str, Method], frames: int = 4,
-                 rounds: int = 5, on_step: Callable[[int], None] = lambda done: None) -> Times:
+                 rounds: int = 5, on_step: Callable[[int], None] = lambda done: None,
+                 command: str = "") -> Times:
     """Measure methods in turns, and write times.json into the sequence's folder.
 
     Args:
         frames: how many are denoised, from the first one on, again in every round.
         rounds: how many count; one more goes before them.
         on_step: told how many steps are done.
+        command: the command line, for times.json.
 
     Raises:
         InputError: no frames or methods, or a frame lacks a channel that a method needs.
@@ -68,8 +75,8 @@ def time_methods(sequence: Sequence, methods: Mapping[str, Method], frames: int 
     if not numbers or not methods or rounds < 1:
         raise InputError(f"there is nothing to time in {sequence.folder}: "
                          "it takes frames, methods, and a round")
-    needs = {c for method in methods.values() for c in method.needs}
-    needs |= {c for c in TEXTURE if c in sequence.manifest.channels}
+    needs = {c for method in methods.values()
+             for c in channels_read(method, sequence.manifest.channels)}
     loaded = [sequence.read_frame(i, sorted(needs)) for i in numbers]
     names = list(methods)
     states = {name: method.init(*sequence.size) for name, method in methods.items()}
@@ -82,8 +89,9 @@ def time_methods(sequence: Sequence, methods: Mapping[str, Method], frames: int 
         on_step(step + 1)
     height, width = sequence.size
     times = Times(size=(width, height), frames=len(loaded), steps=rounds * len(loaded),
-                  device=backend.choose(), threads=dr.thread_count(), machine=platform.machine(),
-                  ratio_to=names[0], methods=_summary(methods, ms, len(loaded)))
+                  device=backend.choose(), threads=dr.thread_count(),
+                  machine=machine(backend.choose()), command=command, ratio_to=names[0],
+                  methods=_summary(methods, ms, len(loaded)))
     write_text(sequence.folder / "times.json", format_json(times))
     return times
 

@@ -11,10 +11,10 @@ after another and its own state, which holds all that is remembered and all memo
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from types import MappingProxyType
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -22,10 +22,15 @@ from render.errors import InputError
 from render.frame import Frame
 
 from .assignment import Assignment, AssignmentAtrous
+from .asvgf import Asvgf
 from .atrous import Atrous
 from .bilateral import Bilateral
+from .demodulation import CHANNELS as TEXTURE
+from .filtered_innovation import FilteredInnovation
+from .outliers import RemoveOutliers, WithoutOutliers
 from .peers import PEERS
 from .separable import BilateralSeparable
+from .svgf import Svgf
 from .temporal import Temporal
 
 
@@ -33,10 +38,12 @@ class Method(Protocol):
     """What every denoiser offers.
 
     Attributes:
-        needs: channels that a frame must have.
+        needs: channels that a frame must have. A method may also have `uses`: channels that it
+            takes where a frame has them, beside albedo and emission.
     """
 
-    needs: ClassVar[tuple[str, ...]]
+    @property
+    def needs(self) -> tuple[str, ...]: ...
 
     def init(self, height: int, width: int) -> Any:
         """State before the first frame of a sequence of this size."""
@@ -54,13 +61,18 @@ METHODS: Mapping[str, type] = MappingProxyType({
     "temporal": Temporal,
     "assignment": Assignment,
     "assignment-atrous": AssignmentAtrous,
+    "svgf": Svgf,
+    "asvgf": Asvgf,
+    "onespp": FilteredInnovation,
 })
 
 
-def build(name: str, settings: Mapping[str, str] | None = None) -> Method:
+def build(name: str, settings: Mapping[str, str] | None = None,
+          outliers: float | None = None) -> Method:
     """A method by name, with some parameters given as text: `build("bilateral", {"radius": "8"})`.
 
-    The name is one of `METHODS` or `PEERS`.
+    The name is one of `METHODS` or `PEERS`. With `outliers`, frames have those removed first that
+    are farther off than so many deviations (`outliers.py`).
 
     Raises:
         InputError: no such method or parameter (the message lists them), or a value that does
@@ -69,6 +81,8 @@ def build(name: str, settings: Mapping[str, str] | None = None) -> Method:
     if name not in METHODS and name not in PEERS:
         raise InputError(f"unknown method '{name}': use {', '.join((*METHODS, *PEERS))}")
     method = METHODS[name]() if name in METHODS else PEERS[name].make()
+    if outliers is not None:
+        method = WithoutOutliers(method, RemoveOutliers(outliers))
     known = parameters(method)
     typed = {}
     for key, text in (settings or {}).items():
@@ -77,6 +91,12 @@ def build(name: str, settings: Mapping[str, str] | None = None) -> Method:
                              f"it has {', '.join(known)}")
         typed[key] = _parse(key, text, type(known[key]))
     return _replace(method, typed)
+
+
+def channels_read(method: Method, there: Iterable[str]) -> tuple[str, ...]:
+    """Channels that a method reads of a frame that has those in `there`, what it needs first."""
+    optional = {*TEXTURE, *getattr(method, "uses", ())}
+    return tuple(dict.fromkeys((*method.needs, *(c for c in there if c in optional))))
 
 
 def parameters(method: Any) -> dict[str, bool | int | float | str]:

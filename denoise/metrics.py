@@ -51,6 +51,12 @@ def smape(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.mean(np.abs(a - b) / (np.abs(a) + np.abs(b) + SMAPE_FLOOR)))
 
 
+def energy_error(a: np.ndarray, b: np.ndarray) -> float | None:
+    """|mean(a) / mean(b) - 1|, linear; None for a black reference."""
+    mean = np.mean(b, dtype=np.float64)
+    return float(abs(np.mean(a, dtype=np.float64) / mean - 1)) if mean > 0 else None
+
+
 @dataclass(frozen=True)
 class Metric:
     """One measure of a frame.
@@ -87,6 +93,8 @@ _ROWS = (
            "mean((a - b)^2 / (b^2 + 0.01)), linear; a sequence's is the mean over its frames"),
     Metric("smape", "SMAPE", smape, "linear", "", False, ".4f",
            "mean(|a - b| / (|a| + |b| + 0.01)), linear", in_table=False),
+    Metric("energy_error", "energy error", energy_error, "linear", "", False, ".2%",
+           "|mean(a) / mean(b) - 1|, linear", in_table=False),
     Metric("ssim", "SSIM", ssim, "srgb", "", True, ".4f",
            "structural similarity, Gaussian of 1.5 pixels, mean over colours, on clipped sRGB"),
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 from render.errors import InputError
@@ -35,3 +36,14 @@ def check_choice(denoiser: Any, name: str, choices: tuple[str, ...]) -> None:
     value = getattr(denoiser, name)
     if value not in choices:
         raise InputError(f"{name} is '{value}': use {', '.join(choices)}")
+
+
+def pairs(settings: Iterable[str]) -> dict[str, str]:
+    """NAME=VALUE texts of `--set` as a dictionary; InputError for anything else."""
+    found = {}
+    for setting in settings:
+        key, equals, value = setting.partition("=")
+        if not (key and equals and value):
+            raise InputError(f"--set {setting} is not understood: use NAME=VALUE, as in alpha=0.1")
+        found[key.strip()] = value.strip()
+    return found

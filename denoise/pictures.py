@@ -7,7 +7,7 @@ of each below it), `sequence.mp4` (input, a method or more, reference, side by s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 from PIL import Image
@@ -123,8 +123,14 @@ def movie_pictures(sequence: Sequence, scores: Scores, methods: list[str]) -> It
 
 def display_error(image: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """(h, w) mean over R, G, B of |S(a) - S(b)|; as in the scores, non-finite pixels are black."""
-    a, b = (srgb_from_linear(blacken(i, non_finite(i))) for i in (image, reference))
-    return np.abs(a - b).mean(axis=-1)
+    return next(display_errors([image], reference))
+
+
+def display_errors(images: Iterable[np.ndarray], reference: np.ndarray) -> Iterator[np.ndarray]:
+    """`display_error` of several images of one reference."""
+    b = srgb_from_linear(blacken(reference, non_finite(reference)))
+    for image in images:
+        yield np.abs(srgb_from_linear(blacken(image, non_finite(image))) - b).mean(axis=-1)
 
 
 def _images(sequence: Sequence, scores: Scores, frame: int,

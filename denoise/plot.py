@@ -53,12 +53,26 @@ def plot_speed_against_error(scores: Scores, path: Path) -> bool:
     axes.set_xlim(low / 2, high * 3)
     axes.margins(y=0.1)
     colours = colormaps["tab10"].colors
+    turns = [scores.methods[name].interleaved for name in points]
     for i, (ms, db) in enumerate(points.values()):
-        axes.scatter(ms, db, s=95, color=colours[i % 10], edgecolor="white", lw=1.2, zorder=4)
+        hollow = any(turns) and not turns[i]
+        axes.scatter(ms, db, s=70 if hollow else 95, color="white" if hollow else colours[i % 10],
+                     edgecolor=colours[i % 10] if hollow else "white", lw=2.2 if hollow else 1.2,
+                     zorder=4)
+    axes.set_xlabel(f"ms per frame (log scale), {times_are(turns)}", color=_INK)
     _label(figure, axes, points)
     with replacing(path) as part:
         figure.savefig(part, format="png", facecolor="white")
     return True
+
+
+def times_are(in_turns: list[bool]) -> str:
+    """How times were measured, for methods that were or were not timed in turns."""
+    if all(in_turns):
+        return "medians of times measured in turns"
+    if not any(in_turns):
+        return "medians after the first, of each method's own run"
+    return "measured in turns (filled) or medians of their own runs (hollow)"
 
 
 def _style(axes, scores: Scores) -> None:
@@ -69,7 +83,6 @@ def _style(axes, scores: Scores) -> None:
               f"reference {scores.reference_spp} spp", transform=axes.transAxes,
               color=_GREY, fontsize=10)
     axes.set_xscale("log")
-    axes.set_xlabel("ms per frame (median after the first, log scale)", color=_INK)
     axes.set_ylabel(f"{HEADLINE.label} in {HEADLINE.unit} ({scores.tone_map})", color=_INK)
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

@@ -1,85 +1,81 @@
-"""How the numbers of a report came to be: command lines, settings, versions, machine."""
+"""How the numbers of a report came to be: command lines, settings, versions, machines.
+
+Command lines are those that were typed: each command keeps its own with what it makes, in
+manifest.json, run.json, times.json and scores.json. None is worked out afterwards.
+"""
 
 from __future__ import annotations
 
-import shlex
+from collections.abc import Iterable
 from typing import Any
 
-from render.manifest import Run, format_frames
+from render.manifest import Run
 from render.sequence import Sequence
 
+from .interleave import Times, read_times
 from .scorecard import INPUT, Scores
 from .summary import text_of
 from .table import caption
 
 
-def provenance(sequence: Sequence, scores: Scores) -> dict[str, Any]:
-    """How the numbers came to be: commands, settings, versions, and each method's run."""
+def commands(sequence: Sequence, methods: Iterable[str]) -> list[str]:
+    """What made a sequence, the methods' results and the times, in that order; each line once."""
+    times = read_times(sequence.folder)
+    runs = [sequence.read_run(name) for name in methods if name != INPUT]
+    lines = [*sequence.manifest.commands, *(run.command for run in runs),
+             times.command if times else ""]
+    return [line for line in dict.fromkeys(lines) if line]
+
+
+def provenance(sequence: Sequence, scores: Scores, command: str = "") -> dict[str, Any]:
+    """How the numbers came to be: commands, settings, versions, machines, each method's run.
+
+    `command` is the line that makes the report.
+    """
     manifest = sequence.manifest
     runs = {name: sequence.read_run(name) for name in scores.ordered() if name != INPUT}
-    settings = manifest.model_dump(exclude={"versions", "channels", "objects", "format", "about"})
+    settings = manifest.model_dump(exclude={
+        "versions", "channels", "objects", "format", "about", "machine", "commands"})
     facts = {"caption": caption(scores), **{k: text_of(v) for k, v in settings.items() if v != ""},
              "channels": ", ".join(manifest.channels), "objects": ", ".join(manifest.objects)}
-    times = _times(sequence)
-    machine = [("times", f"medians of {times.steps} steps in turns"), ("machine", times.machine),
-               ("device", times.device), ("threads", str(times.threads))] if times else []
+    lines = [*(scores.commands or commands(sequence, runs)), command]
     return {
-        "commands": commands(sequence, runs),
+        "commands": [line for line in dict.fromkeys(lines) if line],
+        "unrecorded": _unrecorded(sequence, scores, runs),
         "facts": [(key.replace("_", " "), value) for key, value in facts.items()],
-        "versions": [*scores.versions.items(), *machine],
+        "versions": list(scores.versions.items()),
+        "machines": _machines(sequence, runs, read_times(sequence.folder)),
         "methods": [{"name": name, "device": run.device, "threads": run.threads,
                      "parameters": [(k, str(v)) for k, v in run.parameters.items()],
-                     "versions": list(run.versions.items())} for name, run in runs.items()],
+                     "versions": list(run.versions.items()),
+                     "machine": run.machine} for name, run in runs.items()],
     }
 
 
-def commands(sequence: Sequence, runs: dict[str, Run]) -> list[str]:
-    """Command lines that make the sequence, its results and this report again."""
-    manifest, folder = sequence.manifest, str(sequence.folder)
-    if manifest.source == "render":
-        first = ["render", manifest.scene, "--frames", format_frames(manifest.frames), "--size",
-                 f"{manifest.width}x{manifest.height}", "--seed", str(manifest.seed or 0)]
-        if manifest.reference_spp:
-            first += ["--reference-spp", str(manifest.reference_spp)]
-            first += ["--antialias"] if manifest.reference_filter == "box" else []
-        first += ["--direct", manifest.direct] if manifest.direct != "mis" else []
-        first += ["--sampler", manifest.sampler] if manifest.sampler != "pcg" else []
-    else:
-        first = ["import", manifest.scene, "--format", manifest.source]
-    lines = [[*first, "--out", folder]]
-    lines += [["denoise", folder, *_denoise_options(name, run)] for name, run in runs.items()]
-    if times := _times(sequence):
-        named = [part for name in times.methods for part in ("--method", name)]
-        lines.append(["time", folder, *named, "--frames", str(times.frames), "--rounds",
-                      str(max(1, times.steps // times.frames))])
-    lines += [["score", folder], ["report", folder]]
-    return [shlex.join(["onespp", *line]) for line in lines]
+def _unrecorded(sequence: Sequence, scores: Scores, runs: dict[str, Run]) -> str:
+    """What has no command line: made by an older version, or by a program of one's own."""
+    lacking = [] if sequence.manifest.commands else ["the sequence"]
+    lacking += [name for name, run in runs.items() if not run.command]
+    lacking += [] if scores.commands else ["the scores"]
+    return ", ".join(lacking)
 
 
-def _times(sequence: Sequence):
-    from .interleave import read_times  # imports Dr.Jit
+def _machines(sequence: Sequence, runs: dict[str, Run],
+              times: Times | None) -> list[tuple[str, str]]:
+    """What was done where, where that is known."""
+    def with_threads(machine: str, device: str, threads: int | None) -> str:
+        return f"{machine}; {device}" + (f", {threads} thread{'s' * (threads > 1)}"
+                                         if threads else "")
 
-    return read_times(sequence.folder)
-
-
-def _denoise_options(name: str, run: Run) -> list[str]:
-    if "external" in run.parameters:
-        return ["--external", str(run.parameters["external"]), "--name", name]
-    method = method_of(name, run)
-    values = [part for k, v in run.parameters.items() for part in ("--set", f"{k}={v}")]
-    return ["--method", method, *([] if method == name else ["--name", name]), *values]
-
-
-def method_of(name: str, run: Run) -> str:
-    """Which method a run under a name of its own was: one that takes its parameters.
-
-    Of several, the longest that the name begins with, else the shortest.
-    """
-    from .methods import METHODS, build, parameters  # imports Dr.Jit
-    from .peers import PEERS
-
-    if name in METHODS or name in PEERS:
-        return name
-    fitting = [m for m in METHODS if parameters(build(m)).keys() == run.parameters.keys()]
-    begun = [m for m in fitting if name.startswith(m)]
-    return max(begun, key=len) if begun else min(fitting, key=len, default=name)
+    manifest = sequence.manifest
+    rows = [("frames", f"{manifest.machine}; {manifest.device}")] if manifest.machine else []
+    where: dict[str, list[str]] = {}
+    for name, run in runs.items():
+        if run.machine:
+            where.setdefault(with_threads(run.machine, run.device, run.threads), []).append(name)
+    rows += [("results" if len(where) == 1 else f"results of {', '.join(names)}", text)
+             for text, names in where.items()]
+    if times:
+        rows.append(("times in turns", f"medians of {times.steps} steps; "
+                     + with_threads(times.machine, times.device, times.threads)))
+    return rows

@@ -4,7 +4,7 @@
     report/data/KIND/.../0000.js    one packed image each (packed.py), loaded when looked at
     report/scores.json, scores.csv
 
-KIND is `frame/CHANNEL`, `reference`, `denoised/METHOD` or `flip/METHOD`. Equal input gives an equal
+KIND is `frame/CHANNEL`, `reference` or `denoised/METHOD`. Equal input gives an equal
 report; files of an older one are removed, others in the folder stay.
 """
 
@@ -24,9 +24,7 @@ from render.errors import InputError
 from render.sequence import Sequence
 
 from . import packed
-from .flip import flip_map
-from .metrics import METRICS, pair
-from .pictures import Progress, display_error
+from .pictures import Progress, display_errors
 from .provenance import provenance
 from .scorecard import INPUT, Scores
 from .summary import best_cells, highlights, page_data, table_data
@@ -35,17 +33,19 @@ from .table import caption
 EDGES = np.logspace(-4, 0, 49)
 """Edges of the bins of the histogram; errors below the first are in the first bin."""
 
-_SCRIPTS = ("format.js", "pixels.js", "plots.js", "charts.js", "view.js", "viewer.js",
-            "controls.js", "page.js")
+_COLOURS = ("unshadowed", "specular", "albedo")  # packed as radiance is
+
+_SCRIPTS = ("format.js", "work.js", "pixels.js", "plots.js", "charts.js", "view.js",
+            "readout.js", "viewer.js", "controls.js", "page.js")
 
 
 def write_report(sequence: Sequence, scores: Scores, channels: Iterable[str] | None = None,
-                 progress: Progress | None = None) -> Path:
+                 progress: Progress | None = None, command: str = "") -> Path:
     """Write `report/` into the sequence's folder; the path of its index.html.
 
     Args:
         channels: of the frames to show beside colour; default: all that there are.
-        progress: called with (done, total, what).
+        progress: called with (done, total, what). command: the command line, to be shown.
 
     Raises:
         InputError: an unknown channel, or a file that cannot be read or written.
@@ -53,9 +53,8 @@ def write_report(sequence: Sequence, scores: Scores, channels: Iterable[str] | N
     shown = _channels(sequence, channels)
     folder = sequence.folder / "report"
     histograms = {name: np.zeros(len(EDGES) - 1) for name in scores.methods}
-    ranges: dict[str, tuple[float, float]] = {}
+    ranges: dict[str, tuple[float, float]] = {"roughness": (0.0, 1.0)}
     written: set[Path] = set()
-    flips = _flip_frames(scores)
     with ThreadPoolExecutor() as pool:
         for n, frame in enumerate(scores.frames):
             def write(job: tuple[str, np.ndarray, packed.Kind], frame: int = frame) -> Path:
@@ -66,20 +65,19 @@ def write_report(sequence: Sequence, scores: Scores, channels: Iterable[str] | N
 
             images = list(_images(sequence, scores, frame, shown))
             known = {key: image for key, image, _ in images}
-            if frame in flips:
-                images += _flip_maps(known, scores.methods)
+            packing = [pool.submit(write, image) for image in images]
             _measure(known, histograms, ranges)
-            written |= set(pool.map(write, images))
+            written |= {part.result() for part in packing}
             if progress:
                 progress(n + 1, len(scores.frames), "report")
     shares = {name: [float(f"{x:.4g}") for x in counts / counts.sum()]
               for name, counts in histograms.items() if counts.sum()}
-    data = page_data(sequence, scores, shown, ranges, shares, EDGES, flips)
+    data = page_data(sequence, scores, shown, ranges, shares, EDGES)
     write_text(folder / "scores.json", scores.json_text())
     write_text(folder / "scores.csv", scores.csv_text())
     for old in {*folder.glob("data/**/*.js")} - written:
         old.unlink()
-    write_text(folder / "index.html", render_page(sequence, scores, data))
+    write_text(folder / "index.html", render_page(sequence, scores, data, command))
     return folder / "index.html"
 
 
@@ -100,31 +98,14 @@ def _images(sequence: Sequence, scores: Scores, frame: int,
     """(where it belongs, image, how it is stored) of all images of a frame."""
     images = sequence.read_frame(frame, ("color", *channels)).images
     for name, image in images.items():
-        kind = (packed.WHOLE if name == "id" else
-                packed.RADIANCE if name in RADIANCE else packed.GUIDE)
+        kind = (packed.WHOLE if name in ("id", "hit_id") else
+                packed.RADIANCE if name in (*RADIANCE, *_COLOURS) else packed.GUIDE)
         yield f"frame/{name}", image, kind
     if sequence.has_reference(frame):
         yield "reference", sequence.read_reference(frame).color, packed.RADIANCE
     for name in scores.methods:
         if name != INPUT and sequence.has_result(name, frame):
             yield f"denoised/{name}", sequence.read_result(name, frame), packed.RADIANCE
-
-
-def _flip_maps(images: dict[str, np.ndarray],
-               methods: Iterable[str]) -> Iterator[tuple[str, np.ndarray, packed.Kind]]:
-    for name in methods:
-        image = images.get(_where(name))
-        if image is not None:
-            a, b = pair(image, images["reference"]).srgb
-            yield f"flip/{name}", flip_map(a, b), packed.GUIDE
-
-
-def _flip_frames(scores: Scores) -> list[int]:
-    """Frames with maps of FLIP: those on which it was measured."""
-    if "flip" not in METRICS:
-        return []
-    return sorted({row.frame for method in scores.methods.values() for row in method.per_frame
-                   if row["flip"] is not None})
 
 
 def _where(name: str) -> str:
@@ -134,12 +115,12 @@ def _where(name: str) -> str:
 def _measure(images: dict[str, np.ndarray], histograms: dict[str, np.ndarray],
              ranges: dict[str, tuple[float, float]]) -> None:
     """Add a frame's errors to the histograms, and widen the ranges of what has no unit range."""
-    for name, counts in histograms.items():
-        image = images.get(_where(name))
-        if image is not None and "reference" in images:
-            error = np.clip(display_error(image, images["reference"]), EDGES[0], EDGES[-1])
-            counts += np.histogram(error, EDGES)[0]
-    for name in ("depth", "position"):
+    if "reference" in images:
+        judged = {name: images[_where(name)] for name in histograms if _where(name) in images}
+        for name, error in zip(judged, display_errors(judged.values(), images["reference"])):
+            inside = np.clip(error, EDGES[0], EDGES[-1])
+            histograms[name] += np.histogram(inside, EDGES)[0]
+    for name in ("depth", "position", "hit_distance"):
         image = images.get(f"frame/{name}")
         if image is not None:
             values = image[np.isfinite(image) & (image != 0)]
@@ -148,7 +129,7 @@ def _measure(images: dict[str, np.ndarray], histograms: dict[str, np.ndarray],
                 ranges[name] = (min(low, float(values.min())), max(high, float(values.max())))
 
 
-def render_page(sequence: Sequence, scores: Scores, data: dict) -> str:
+def render_page(sequence: Sequence, scores: Scores, data: dict, command: str = "") -> str:
     """The text of index.html."""
     environment = jinja2.Environment(loader=jinja2.PackageLoader("denoise", "page"),
                                      autoescape=True, undefined=jinja2.StrictUndefined,
@@ -161,7 +142,8 @@ def render_page(sequence: Sequence, scores: Scores, data: dict) -> str:
     return environment.get_template("page.html.j2").render(
         scores=scores, about=sequence.manifest.about, tiles=highlights(scores),
         caption=caption(scores), columns=columns, rows=rows, best=best_cells(scores, columns),
-        made=provenance(sequence, scores), style=text("page.css"),
+        made=provenance(sequence, scores, command), style=text("page.css"),
+        glossy="roughness" in sequence.manifest.channels,
         script="\n".join(text(name) for name in _SCRIPTS),
         # "<" would let a name in the data end the element that holds it.
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"))

@@ -131,57 +131,72 @@ def reproject(stencil: Stencil, surface: list[Float], table: Float, dual: list[F
     Returns:
         three arrays, and the mask of pixels that have a history.
     """
-    float_t, int_t = stencil.Float, stencil.Int
+    float_t = stencil.Float
     id_, *normal, depth = surface
-    objects = dr.width(table) // _ROW
-    known = (id_ >= 0) & (id_ < objects)
-    quad = stencil.UInt(dr.select(known, id_, 0)) * (_ROW // 4)
-    rows = [dr.gather(stencil.Array4f, table, quad + r) for r in range(6)]
+    known = (id_ >= 0) & (id_ < dr.width(table) // _ROW)
+    (ex, tx, ey, ty, ew, tw), rotation = _motion(stencil, table, dr.select(known, id_, 0))
     row, column = stencil.pixel()
     u = [float_t(column) + 0.5, float_t(row) + 0.5, float_t(1)]
     inverse_depth = 1 / depth
-    d = [dr.fma(e.w, inverse_depth, dot([e.x, e.y, e.z], u)) for e in rows[:3]]
-    scale = 1 + d[2]
-    x = u[0] + (d[0] - u[0] * d[2]) / scale
-    y = u[1] + (d[1] - u[1] * d[2]) / scale
+    dx, dy, dw = (dr.fma(t, inverse_depth, dot(e, u)) for e, t in ((ex, tx), (ey, ty), (ew, tw)))
+    scale = 1 + dw
+    shrink = 1 / scale
+    x, y = dr.fma(dx - u[0] * dw, shrink, u[0]), dr.fma(dy - u[1] * dw, shrink, u[1])
     inside = (known & (scale > 1e-6) & (x >= 0) & (x < stencil.width)
               & (y >= 0) & (y < stencil.height))
     x, y = dr.select(inside, x, 0.5), dr.select(inside, y, 0.5)
 
-    def tap(column: Any, row: Any) -> tuple[list[Float], Float]:
-        lane = stencil.UInt(row * stencil.stride + column)
+    def tap(lane: Any) -> list[Float]:
         words = dr.gather(stencil.ArrayXf, history, lane, shape=(WORDS, stencil.lanes))
-        return [words[i] for i in range(3)], words
+        return [words[i] for i in range(WORDS)]
 
+    id_ = float_t(id_)
     if tests.nearest:
-        color, words = tap(int_t(x), int_t(y))
-        return color, inside & (words[3] == float_t(id_))
+        words = tap(stencil.UInt(y) * stencil.stride + stencil.UInt(x))
+        return words[:3], inside & (words[3] == id_)
 
-    expected = transform([[r.x, r.y, r.z] for r in rows[3:]], normal)
+    expected = transform(rotation, normal)
     plane = transform([dual[:3], dual[3:6], dual[6:]], expected)  # n' . X' = z' plane . u'
     depth = depth * scale
     offset = depth * dot(plane, [x, y, float_t(1)])
-    smooth = dot(normal, normal) > 0.25
+    nearness = limits[1] * depth
+    rough = dot(normal, normal) <= 0.25
     left, top = dr.floor(x - 0.5), dr.floor(y - 0.5)
-    fx, fy = x - 0.5 - left, y - 0.5 - top
+    columns, x_weights = _pair(left, x - 0.5 - left, stencil.width)
+    rows, y_weights = _pair(top, y - 0.5 - top, stencil.height)
+    at_corner = dot(plane, [left + 0.5, top + 0.5, float_t(1)])
     sums, total = [float_t(0)] * 3, float_t(0)
-    for dy in (0, 1):
-        for dx in (0, 1):
-            column, row = int_t(left) + dx, int_t(top) + dy
-            on_screen = ((column >= 0) & (column < stencil.width)
-                         & (row >= 0) & (row < stencil.height))
-            color, words = tap(dr.select(on_screen, column, 0), dr.select(on_screen, row, 0))
-            center = [float_t(column) + 0.5, float_t(row) + 0.5, float_t(1)]
-            tap_normal, tap_depth = [words[4], words[5], words[6]], words[7]
-            near = dr.abs(tap_depth * dot(plane, center) - offset) < limits[1] * depth
-            turned = dot(expected, tap_normal) > limits[0]
-            passes = on_screen & (words[3] == float_t(id_)) & (~smooth | (near & turned))
-            weight = dr.select(passes, (fx if dx else 1 - fx) * (fy if dy else 1 - fy), 0)
-            sums = [dr.fma(weight, c, s) for c, s in zip(color, sums)]
+    for i in (0, 1):
+        for j in (0, 1):
+            words = tap(stencil.UInt(rows[i]) * stencil.stride + stencil.UInt(columns[j]))
+            at_tap = at_corner + (plane[0] * j + plane[1] * i)
+            near = dr.abs(dr.fma(words[7], at_tap, -offset)) < nearness
+            turned = dot(expected, words[4:7]) > limits[0]
+            passes = (words[3] == id_) & (rough | (near & turned))
+            weight = dr.select(passes, x_weights[j] * y_weights[i], 0)
+            sums = [dr.fma(weight, c, s) for c, s in zip(words, sums)]
             total += weight
     valid = inside & (total >= LEAST_WEIGHT)
     scale = 1 / dr.select(valid, total, 1)
     return [s * scale for s in sums], valid
+
+
+def _motion(stencil: Stencil, table: Float, object_: Any) -> tuple[list[Any], list[list[Float]]]:
+    """(row of E, row of S' t) three times over, and R's rows, of each pixel's object."""
+    start = stencil.UInt(object_) * (_ROW // WORDS)
+    words = []
+    for i in range(3):
+        eight = dr.gather(stencil.ArrayXf, table, start + i, shape=(WORDS, stencil.lanes))
+        words += [eight[k] for k in range(WORDS)]
+    motion = [part for at in (0, 4, 8) for part in (words[at:at + 3], words[at + 3])]
+    return motion, [words[at:at + 3] for at in (12, 16, 20)]
+
+
+def _pair(first: Float, fraction: Float, size: int) -> tuple[list[Float], list[Float]]:
+    """Indices `first` and the next one, and their weights: 0, and another index, off the screen."""
+    last = float(size - 1)
+    return ([dr.select(first > 0, first, 0), dr.select(first < last, first + 1, last)],
+            [dr.select(first >= 0, 1 - fraction, 0), dr.select(first < last, fraction, 0)])
 
 
 def check_motion(previous: Frame, current: Frame) -> None:

@@ -26,13 +26,15 @@ from .interleave import read_times
 from .judge import Judge
 from .metrics import METRICS, reference_floor, spread
 from .pictures import Progress, draw_pictures
+from .provenance import commands
 from .scorecard import INPUT, MethodScore, Scores
 from .stability import MEASURES
 from .tonemap import TONE_MAP
 
 
 def score(sequence: Sequence, methods: list[str] | None = None, pictures: bool = True,
-          progress: Progress | None = None, seeds: list[Sequence] | None = None) -> Scores:
+          progress: Progress | None = None, seeds: list[Sequence] | None = None,
+          command: str = "") -> Scores:
     """Score a sequence, and write scores.json, scores.csv and `pictures/` into its folder.
 
     Without a reference everything but the error is reported; a method with results for some
@@ -43,6 +45,7 @@ def score(sequence: Sequence, methods: list[str] | None = None, pictures: bool =
         pictures: also draw contact sheets, the movie and the plot.
         progress: called with (done, total, what).
         seeds: renders of the same with other seeds, to split errors by (`bias.py`).
+        command: the command line, for scores.json.
 
     Raises:
         InputError: an unknown method, no frames, a file that cannot be read or written, or
@@ -54,6 +57,10 @@ def score(sequence: Sequence, methods: list[str] | None = None, pictures: bool =
         scores = scores.model_copy(update={"methods": {
             name: method.model_copy(update={"split": splits.get(name)})
             for name, method in scores.methods.items()}})
+    made = [line for s in (sequence, *(seeds or ())) for line in
+            commands(s, [name for name in scores.methods if name in s.methods()])]
+    scores = scores.model_copy(update={
+        "commands": [line for line in dict.fromkeys([*made, command]) if line]})
     write_text(sequence.folder / "scores.json", scores.json_text())
     write_text(sequence.folder / "scores.csv", scores.csv_text())
     if pictures:
@@ -152,7 +159,7 @@ def _scores(sequence: Sequence, frames: list[int], known: dict[int, _Known],
         seed=manifest.seed, spp=manifest.spp,
         reference_spp=min((k.spp for k in known.values()), default=None),
         reference_floor_db=_mean(floors.values()), reference_floor_per_frame=floors,
-        tone_map=TONE_MAP, versions=manifest.versions,
+        tone_map=TONE_MAP, versions=manifest.versions, machine=manifest.machine,
         notes=list(_notes(manifest.frames, frames, known, methods)), methods=methods)
 
 
@@ -171,7 +178,10 @@ def _notes(wanted: tuple[int, ...], frames: list[int], known: dict[int, _Known],
                f"{max(k.spp for k in known.values())} samples a pixel.")
     timed = [name for name, method in methods.items() if method.interleaved]
     if timed:
-        yield f"Times of {', '.join(timed)} were measured in turns (`onespp time`)."
+        others = any(m.ms_per_frame for m in methods.values() if not m.interleaved)
+        yield (f"Times of {', '.join(timed)} were measured in turns (`onespp time`)"
+               + ("; the others are medians of their own runs, and compare less well." if others
+                  else "."))
     for name, method in methods.items():
         if len(method.per_frame) < len(frames):
             yield (f"{name} has {len(method.per_frame)} of {len(frames)} frames; its numbers are "

@@ -7,16 +7,18 @@ from pathlib import Path
 
 import click
 
+from render.lock import writing
 from render.sequence import Sequence
-from render.terminal import named_progress
+from render.terminal import command_line, named_progress
+
+from .json_option import json_option, show_or_print
 
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--method", "methods", multiple=True, metavar="NAME",
               help="Score these alone; default all that have results.")
-@click.option("--json", "json_to", metavar="FILE",
-              help="Also write the scores to FILE; - prints them instead of the table.")
+@json_option
 @click.option("--pictures/--no-pictures", default=True, show_default=True,
               help="Draw contact sheets, plot and movie.")
 @click.option("--by-cause", is_flag=True,
@@ -33,27 +35,25 @@ def score(folder: Path, methods: tuple[str, ...], json_to: str | None, pictures:
 def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = None,
              pictures: bool = True, by_cause: bool = False, seeds: tuple[Path, ...] = ()) -> None:
     """Do what the options of `score` ask."""
-    from render.atomic import write_text
-
     from .score import score as score_sequence
     from .table import print_classes, print_scores, print_splits
 
     sequence = Sequence.open(folder)
     others = [Sequence.open(other) for other in seeds]
-    with named_progress() as report:
-        scores = score_sequence(sequence, list(methods) or None, pictures, report, others)
-    if json_to == "-":
-        click.echo(scores.json_text(), nl=False)
-        return
-    if json_to:
-        write_text(Path(json_to), scores.json_text())
-    print_scores(scores)
-    if by_cause:
-        print_classes(scores)
-    if seeds:
-        print_splits(scores)
-    drawn = " and pictures/" if pictures else ""
-    click.echo(f"wrote {folder / 'scores.json'}, scores.csv{drawn}")
+    with writing(folder, "score"), named_progress() as report:
+        scores = score_sequence(sequence, list(methods) or None, pictures, report, others,
+                                command_line())
+
+    def show() -> None:
+        print_scores(scores)
+        if by_cause:
+            print_classes(scores)
+        if seeds:
+            print_splits(scores)
+        drawn = " and pictures/" if pictures else ""
+        click.echo(f"wrote {folder / 'scores.json'}, scores.csv{drawn}")
+
+    show_or_print(scores.json_text(), json_to, show)
 
 
 @click.command()
@@ -69,8 +69,9 @@ def report(folder: Path, channels: str | None) -> None:
     if not (folder / "scores.json").exists():
         score_in(folder)
     names = channels and [name.strip() for name in channels.split(",") if name.strip()]
-    with named_progress() as tell:
-        page = write_report(sequence, read_scores(folder / "scores.json"), names or None, tell)
+    with writing(folder, "report"), named_progress() as tell:
+        page = write_report(sequence, read_scores(folder / "scores.json"), names or None, tell,
+                            command_line())
     click.echo(f"wrote {page}: open it in a browser")
 
 
@@ -83,26 +84,18 @@ def report(folder: Path, channels: str | None) -> None:
               help="What may get worse by how much, as psnr_srgb=0.2, relmse=5% or ms=20%; may be "
                    "given several times. Default psnr_srgb=0.1, other measures 2%, time any.")
 @click.option("--all", "show_all", is_flag=True, help="Also list what stayed the same.")
-@click.option("--json", "json_to", metavar="FILE",
-              help="Also write the comparison to FILE; - prints it instead of the table.")
+@json_option
 def compare(a: Path, b: Path, methods: tuple[str, ...], thresholds: tuple[str, ...],
             show_all: bool, json_to: str | None) -> None:
     """Compare the scores.json A with a later B; exit 1 if something got worse past a threshold.
 
     Change by change, with its standard error over the frames that both have.
     """
-    from render.atomic import write_text
-
     from .compare import comparison, parse_thresholds, print_comparison
     from .scorecard import read_scores
 
     found = comparison(read_scores(a), read_scores(b), list(methods) or None,
                        parse_thresholds(thresholds))
-    if json_to and json_to != "-":
-        write_text(Path(json_to), found.json_text())
-    if json_to == "-":
-        click.echo(found.json_text(), nl=False)
-    else:
-        print_comparison(found, show_all)
+    show_or_print(found.json_text(), json_to, lambda: print_comparison(found, show_all))
     if found.failed:
         sys.exit(1)

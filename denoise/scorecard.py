@@ -12,7 +12,7 @@ import io
 from pathlib import Path
 from typing import Any
 
-from pydantic import ConfigDict, Field, FiniteFloat, model_serializer
+from pydantic import ConfigDict, Field, FiniteFloat, field_validator, model_serializer
 
 from render.json_file import JsonFile, format_json, read_json
 
@@ -78,7 +78,7 @@ class MethodScore(Measured):
         startup_ms: what the first three frames took beyond that median each: compiling, loading.
         megapixels_per_s: pixels over that median. peak_mb: of `Run`.
         non_finite_pixels: sum over frames; such pixels were scored as black.
-        device, threads, parameters, versions: of the run that made the results.
+        device, machine, threads, parameters, versions: of the run that made the results.
         by_cause, by_history: error by `classes.CAUSES` and `HISTORIES`, over the frames that
             have a frame before them; empty without reference or guides.
         split: bias and variance, where other seeds were given.
@@ -92,6 +92,7 @@ class MethodScore(Measured):
     interleaved: bool = False
     non_finite_pixels: int
     device: str
+    machine: str = ""
     threads: int | None
     parameters: dict[str, Any]
     versions: dict[str, str]
@@ -109,7 +110,9 @@ class Scores(JsonFile):
         reference_spp: null where there is no reference.
         reference_floor_db: PSNR that a perfect image is expected to get against this noisy
             reference, mean over frames; per frame in `reference_floor_per_frame`.
-        versions: of what rendered the frames.
+        versions, machine: of what rendered the frames.
+        commands: command lines that made the sequence, the results, the times and these scores,
+            as they were typed, in that order; those that were not recorded are missing.
         tone_map: what "srgb" means in the names of metrics.
         notes: what a reader must know, one sentence each.
     """
@@ -124,8 +127,17 @@ class Scores(JsonFile):
     reference_floor_per_frame: dict[int, FiniteFloat]
     tone_map: str
     versions: dict[str, str]
+    machine: str = ""
+    commands: list[str] = Field(default_factory=list)
     notes: list[str]
     methods: dict[str, MethodScore]
+
+    @field_validator("methods")
+    @classmethod
+    def _has_input(cls, methods: dict[str, MethodScore]) -> dict[str, MethodScore]:
+        if INPUT not in methods:
+            raise ValueError(f"'{INPUT}', which methods are compared with, is missing")
+        return methods
 
     @property
     def has_reference(self) -> bool:

@@ -36,7 +36,7 @@ class BilateralSeparable(Bilateral):
     """
 
     def init_on(self, stencil: Stencil) -> SeparableState:
-        planes = stencil.planes(OUTSIDE)
+        planes = stencil.planes(OUTSIDE, aligned=True)
         window = range(-self.radius, self.radius + 1)
         passes = [planes.taps([(0, dx) for dx in window]), planes.taps([(dy, 0) for dy in window])]
         return SeparableState(stencil, planes, passes, [Step(add_row_of_taps) for _ in passes])

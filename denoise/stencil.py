@@ -36,6 +36,7 @@ Offset = tuple[int, int]
 
 _TAIL = 64  # floats after the last lane that a vector load may touch
 _LINE = 16  # floats in a cache line
+_SHIFT = 7  # floats from a cache line to the first pixel: no filter has taps 7 to the left
 _SETS = 64  # sets of a first-level cache: lines that far apart displace each other
 
 
@@ -89,9 +90,18 @@ class Stencil:
         row = lane // self.stride
         return row, dr.minimum(lane - row * self.stride, self.width - 1)
 
-    def planes(self, outside: Sequence[float]) -> Planes:
-        """Persistent planes, one for each value in `outside`, which their border holds."""
-        return Planes(self, tuple(outside))
+    @property
+    def plane_bytes(self) -> int:
+        """Memory of all planes made so far that is not Dr.Jit's own."""
+        return self.planes_made * 4 * self.size
+
+    def planes(self, outside: Sequence[float], aligned: bool = False) -> Planes:
+        """Persistent planes, one for each value in `outside`, which their border holds.
+
+        Args:
+            aligned: pixels start at a cache line, for filters along a column: see `_allocate`.
+        """
+        return Planes(self, tuple(outside), aligned)
 
     def load(self, image: np.ndarray) -> list[Float]:
         """(h, w) or (h, w, c) image to one array of lanes a component. Traced, not evaluated."""
@@ -135,8 +145,8 @@ class Stencil:
 def _spread(least: int) -> int:
     """Smallest stride from `least` on that is an odd number of cache lines.
 
-    Taps straight above and below are then as aligned as the pixel itself, and rows a power of two
-    apart fall into different sets of the cache. With an even number (as in 544 floats) all rows of
+    Taps straight above and below are then as aligned as the pixel itself; rows a power of two apart
+    fall into different sets of the cache. With an even number (as in 544 floats) all rows of
     taps in all planes share a few sets, and a kernel is four times slower.
     """
     lines = -(-least // _LINE)
@@ -154,43 +164,44 @@ def _module(device: str) -> ModuleType:
 class Planes:
     """A few channels of one grid in persistent, padded memory."""
 
-    def __init__(self, stencil: Stencil, outside: tuple[float, ...]) -> None:
+    def __init__(self, stencil: Stencil, outside: tuple[float, ...], aligned: bool) -> None:
         self.stencil = stencil
         self._views: dict[tuple[int, int, int], Float] = {}
         self._memory, self._arrays = [], []
         for value in outside:
             if stencil.layout == "views":
-                self._memory.append(_allocate(stencil.size, value, stencil.planes_made))
+                index, shift = stencil.planes_made, 0 if aligned else _SHIFT
+                self._memory.append(_allocate(stencil.size, value, index, shift))
                 stencil.planes_made += 1
             else:
                 self._arrays.append(dr.opaque(stencil.Float, float(value), stencil.size))
 
-    def store(self, arrays: Sequence[Float]) -> None:
-        """Copy evaluated arrays of lanes into the first planes; their gutters are left out."""
+    def store(self, arrays: Sequence[Float], first: int = 0) -> None:
+        """Copy evaluated arrays of lanes into planes from `first` on; gutters are left out."""
         s = self.stencil
         if s.layout == "gather":
             lane = dr.arange(s.UInt, s.lanes)
             inside = lane % s.stride < s.width
-            for plane, array in zip(self._arrays, arrays):
+            for plane, array in zip(self._arrays[first:], arrays):
                 dr.scatter(plane, array, lane + s.top, inside)
             dr.eval(self._arrays)
             return
-        for memory, array in zip(self._memory, arrays):
+        for memory, array in zip(self._memory[first:], arrays):
             rows = memory[s.top:s.top + s.lanes].reshape(s.height, s.stride)
             np.copyto(rows[:, :s.width], array.numpy().reshape(rows.shape)[:, :s.width])
 
-    def taps(self, offsets: Sequence[Offset]) -> Taps:
-        """The planes seen from the neighbours at offsets (dy, dx)."""
+    def taps(self, offsets: Sequence[Offset], count: int | None = None) -> Taps:
+        """The (first `count`) planes seen from the neighbours at offsets (dy, dx)."""
         s = self.stencil
         if any(max(abs(dy), abs(dx)) > s.reach for dy, dx in offsets):
             raise ValueError(f"a tap lies farther than the stencil's reach of {s.reach} pixels")
         starts = [s.top + dy * s.stride + dx for dy, dx in offsets]
         if s.layout == "gather":
-            return Taps([], self._arrays, [dr.opaque(s.UInt, start) for start in starts], s.lanes,
-                        s.backend)
-        count = range(len(self._memory))
-        return Taps([[self._view(c, start) for c in count] for start in starts], [], [], s.lanes,
-                    s.backend)
+            at = [dr.opaque(s.UInt, start) for start in starts]
+            return Taps([], self._arrays[:count], at, s.lanes, s.backend)
+        channels = range(len(self._memory))[:count]
+        return Taps([[self._view(c, start) for c in channels] for start in starts], [], [],
+                    s.lanes, s.backend)
 
     def _view(self, channel: int, start: int) -> Float:
         """The same offset gives the same variable, so that a frozen function sees the alias."""
@@ -201,15 +212,18 @@ class Planes:
         return self._views[key]
 
 
-def _allocate(size: int, value: float, index: int) -> np.ndarray:
-    """Float32 memory that starts at a cache line, each plane's in another set.
+def _allocate(size: int, value: float, index: int, shift: int) -> np.ndarray:
+    """Float32 memory that starts `shift` floats after a cache line, each plane's in another set.
 
-    A load across two lines costs twice as much. Since rows are whole lines too, whether a tap is
-    at one depends on its dx alone; a tap that is, is another kernel to Dr.Jit than one that is not.
+    With a shift, hardly any tap starts at a line. One that does is quicker to load, but Dr.Jit
+    takes another instruction for it, and where there are many, LLVM moves those to the top of the
+    kernel: their vectors wait on the stack, which does not start at a line, and the kernel takes
+    up to twice as long. Rows are whole lines, so it is the taps' dx alone which decides, and with
+    a shift all levels of a filter are one kernel.
     """
     memory = np.empty(4 * (size + 2 * _SETS * _LINE), np.uint8)
     page = -memory.ctypes.data % (4 * _SETS * _LINE)
-    start = page + 4 * _LINE * (index * 13 % _SETS)
+    start = page + 4 * (_LINE * (index * 13 % _SETS) + shift)
     floats = memory[start:start + 4 * size].view(np.float32)
     floats.fill(value)
     return floats

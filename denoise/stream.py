@@ -20,13 +20,14 @@ import numpy as np
 
 from render import backend
 from render.frame import Frame
+from render.machine import machine
 from render.manifest import Run
 from render.sequence import Sequence
 from render.versions import versions
 
-from .demodulation import CHANNELS as TEXTURE
 from .memory import PeakMemory
-from .methods import Method, parameters
+from .methods import Method, channels_read, parameters
+from .outliers import energy_kept
 from .timing import timed
 
 ALONE = 8  # frames that nothing else runs beside
@@ -101,7 +102,8 @@ class _Files:
 
 def denoise_sequence(sequence: Sequence, method: Method, name: str,
                      on_frame: Callable[[int, float], None] = lambda done, ms: None,
-                     on_pace: Callable[[Pace], None] = lambda pace: None) -> Run:
+                     on_pace: Callable[[Pace], None] = lambda pace: None,
+                     command: str = "") -> Run:
     """Denoise every frame that is there, in order, and write results and `run.json`.
 
     History needs the frames before, so a run always begins at the first frame; an interrupted one
@@ -111,6 +113,7 @@ def denoise_sequence(sequence: Sequence, method: Method, name: str,
         name: the name of the results' folder.
         on_frame: told the number of frames done and the milliseconds of the last one.
         on_pace: told at the end how fast frames came where reading and writing overlapped.
+        command: the command line, for run.json.
     Returns:
         The run. Times are of calls with nothing beside them, so of the first `ALONE` frames: the
         frame is in memory before, the result after.
@@ -122,10 +125,11 @@ def denoise_sequence(sequence: Sequence, method: Method, name: str,
     dr.flush_malloc_cache()  # so that this method's memory is seen, and not the last one's
     peak = PeakMemory()
     run = Run(method=name, parameters=parameters(method), device=backend.choose(),
-              threads=dr.thread_count(), versions=versions("drjit"))
+              threads=dr.thread_count(), versions=versions("drjit"),
+              machine=machine(backend.choose()), command=command)
     _remove_stale(sequence, run)
     frames = [i for i in sequence.frames if sequence.has_frame(i)]
-    used = (*method.needs, *(c for c in TEXTURE if c in sequence.manifest.channels))
+    used = channels_read(method, sequence.manifest.channels)
     state = method.init(*sequence.size)
     try:
         with Threads(1) as threads:
@@ -149,14 +153,15 @@ def denoise_sequence(sequence: Sequence, method: Method, name: str,
                              files.seconds))
     finally:
         run = run.model_copy(update={"ms": ms, "first_ms": next(iter(ms.values()), None),
-                                    "peak_mb": peak.megabytes})
+                                    "peak_mb": peak.megabytes, "energy_kept": energy_kept(state)})
         sequence.write_run(name, run)
     return run
 
 
 def _remove_stale(sequence: Sequence, run: Run) -> None:
-    """Drop results that this run would otherwise be mixed with."""
+    """Drop results that this run would otherwise be mixed with: others', and a killed run's."""
     if run.method in sequence.methods():
         old = sequence.read_run(run.method)
-        if (old.parameters, old.versions) != (run.parameters, run.versions):
-            sequence.remove_results(run.method)
+        if (old.parameters, old.versions) == (run.parameters, run.versions):
+            return
+    sequence.remove_results(run.method)

@@ -14,23 +14,22 @@ from render.sequence import Sequence
 from .classes import CAUSES, HISTORIES
 from .metrics import HEADLINE, PSNR_CAP, Metric
 from .panels import ERROR_MAX
-from .plot import pareto_front
+from .plot import pareto_front, times_are
 from .scorecard import INPUT, ClassScore, MethodScore, Scores
 from .stability import MEASURES
 from .table import cells
 
-_SHOWN_ELSEWHERE = {"ms_per_frame", *MEASURES}
+_SHOWN_ELSEWHERE = {"ms_per_frame", "machine", *MEASURES}
 
 
 def page_data(sequence: Sequence, scores: Scores, channels: list[str],
               ranges: dict[str, tuple[float, float]], histograms: dict[str, list[float]],
-              edges: np.ndarray, flip_frames: list[int]) -> dict[str, Any]:
+              edges: np.ndarray) -> dict[str, Any]:
     """What the page's scripts read.
 
     Args:
         channels: those of the frames that the report holds. ranges: of those that need one.
         histograms: method -> share of pixels in each bin between `edges`.
-        flip_frames: those with maps of FLIP.
     """
     manifest = sequence.manifest
     metrics = [m for m in MEASURES.values()
@@ -46,10 +45,11 @@ def page_data(sequence: Sequence, scores: Scores, channels: list[str],
         "methods": [_method(sequence, scores, name, metrics, histograms.get(name))
                     for name in scores.ordered()],
         "classes": _classes(scores),
-        "edges": [float(f"{e:.4g}") for e in edges], "flipFrames": flip_frames,
+        "edges": [float(f"{e:.4g}") for e in edges],
         "channels": [{"name": name, "about": CHANNELS[name].about, "range": ranges.get(name)}
                      for name in channels],
         "objects": list(manifest.objects) if "id" in channels else [],
+        "timesAre": times_are([m.interleaved for m in scores.methods.values() if m.ms_per_frame]),
         "errorMax": ERROR_MAX, "exact": PSNR_CAP,
         "maps": {name: _colours(name) for name in ("inferno", "magma")},
     }
@@ -75,7 +75,7 @@ def _method(sequence: Sequence, scores: Scores, name: str, metrics: list[Metric]
 
     return {
         "name": name, "colour": coloured.index(name) if name in coloured else None,
-        "ms": method.ms_per_frame,
+        "ms": method.ms_per_frame, "inTurns": method.interleaved,
         "values": {m.name: method[m.name] for m in metrics},
         "perFrame": {m.name: over_frames(m.name) for m in metrics},
         "frames": [i for i in scores.frames if i in rows],

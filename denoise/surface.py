@@ -138,8 +138,8 @@ def repair(color: np.ndarray, id_: np.ndarray) -> np.ndarray:
 
 def _sums_around(color: np.ndarray, good: np.ndarray, id_: np.ndarray, y: np.ndarray, x: np.ndarray,
                  radius: int) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3) sum and (n,) number of good pixels of the same object around pixels (y, x)."""
-    total, count = np.zeros((len(y), 3)), np.zeros(len(y))
+    """(n, c) sum and (n,) number of good pixels of the same object around pixels (y, x)."""
+    total, count = np.zeros((len(y), color.shape[2])), np.zeros(len(y))
     height, width = good.shape
     for dy in range(-radius, radius + 1):
         for dx in range(-radius, radius + 1):

@@ -8,14 +8,16 @@ mu and sigma mean and deviation of C in a window, per channel; alpha = 1 where t
 The window mixes objects, as the assignment has it: with k = 1, a pixel at a corner of one colour
 among another has its history pulled towards the other. A wider box trades that for lag.
 
-The window counts only pixels inside the image, and the variance is about the mean. It is summed
-by rows, then by columns, each row as (count, mean, squares about its own mean), which joined
-(Chan et al. 1983) lose no digits on bright pixels, as E[x^2] - E[x]^2 does.
+The window counts only pixels inside the image. Sums run over differences d from the pixel itself:
+since it is one of the window's n, E[d^2] is at most n times the variance, and E[d^2] - E[d]^2 loses
+few digits, whatever the brightness. All n taps are summed at once: by rows and then by columns
+takes fewer operations, but what goes through memory between the two costs more than that.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import drjit as dr
@@ -60,19 +62,15 @@ class Temporal(OnLanes):
         return self.clamp_radius
 
     def init_on(self, stencil: Stencil) -> TemporalState:
-        color, rows = stencil.planes([0.0] * 3), stencil.planes([0.0] * 6)
-        window = range(-self.clamp_radius, self.clamp_radius + 1)
+        color = stencil.planes([0.0] * 3)
+        side = range(-self.clamp_radius, self.clamp_radius + 1)
         tests = Tests(self.nearest, self.min_cosine, self.plane_tolerance)
-
-        def sum_rows(taps: Taps, center: list[Float]) -> list[Float]:
-            return row_moments(stencil, taps, center)
 
         def blend(taps: Taps, *arguments: Any) -> tuple[list[Float], Float]:
             return clamp_and_blend(stencil, tests, taps, *arguments)
 
-        return TemporalState(stencil, color, color.taps([(0, dx) for dx in window]),
-                             rows, rows.taps([(dy, 0) for dy in window]),
-                             Step(sum_rows), Step(blend))
+        return TemporalState(stencil, color, color.taps([(dy, dx) for dy in side for dx in side]),
+                             Step(blend))
 
     def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
                  state: TemporalState) -> tuple[list[Float], TemporalState]:
@@ -85,26 +83,22 @@ class Temporal(OnLanes):
             return color, state.after(frame, history)
         check_motion(previous, frame)
         state.color.store(color)
-        state.rows.store(state.sum_rows(state.row_taps, color))
         table = load_table(motion_table(previous, frame), stencil)
         dual = [stencil.opaque(x) for x in camera_from_screen(previous).T.ravel()]
         numbers = [stencil.opaque(x) for x in (self.alpha, self.color_box, self.min_cosine,
                                                self.plane_tolerance)]
-        result, history = state.blend(state.column_taps, color, guides, [table], dual,
-                                      [state.history], numbers)
+        result, history = state.blend(state.taps, color, guides, [table], dual, [state.history],
+                                      numbers)
         return result, state.after(frame, history)
 
 
 @dataclass(frozen=True)
 class TemporalState:
-    """Window sums' planes and steps; the previous frame's matrices and packed history."""
+    """Planes of the colour, the window's taps, the previous frame's matrices and history."""
 
     stencil: Stencil
     color: Any
-    row_taps: Taps
-    rows: Any
-    column_taps: Taps
-    sum_rows: Step
+    taps: Taps
     blend: Step
     previous: Frame | None = None
     history: Float = field(default=None, repr=False)
@@ -113,40 +107,13 @@ class TemporalState:
         """The state for the frame after `frame`; of that one only the matrices are kept."""
         seen = Frame(frame.index, {"id": frame["id"]}, frame.camera_from_world,
                      frame.screen_from_world, frame.world_from_object)
-        return TemporalState(self.stencil, self.color, self.row_taps, self.rows, self.column_taps,
-                             self.sum_rows, self.blend, seen, history)
-
-
-def _inside(position: Any, offset: int, size: int) -> Any:
-    """Whether position + offset is in [0, size)."""
-    at = position + offset
-    return (at >= 0) & (at < size)
-
-
-def row_moments(stencil: Stencil, taps: Taps, center: list[Float]) -> list[Float]:
-    """Mean (3) and sum of squares about it (3) of a row of taps, inside the image."""
-    radius = len(taps) // 2
-    column = stencil.Int(stencil.pixel()[1])
-    inside = [_inside(column, dx, stencil.width) for dx in range(-radius, radius + 1)]
-    count = sum((dr.select(i, stencil.Float(1), 0) for i in inside), stencil.Float(0))
-    means, squares = [], []
-    for c in range(3):
-        values = [taps.at(i)[c] for i in range(len(taps))]
-        mean = sum(values, stencil.Float(0)) / count  # outside the planes hold 0
-        square = stencil.Float(0)
-        for i, value in zip(inside, values, strict=True):
-            d = dr.select(i, value - mean, 0)
-            square = dr.fma(d, d, square)
-        means.append(mean)
-        squares.append(square)
-        taps.next()
-    return means + squares
+        return replace(self, previous=seen, history=history)
 
 
 def clamp_and_blend(stencil: Stencil, tests: Tests, taps: Taps, color: list[Float],
                     guides: list[Float], table: list[Float], dual: list[Float],
                     history: list[Float], numbers: list[Float]) -> tuple[list[Float], Float]:
-    """Blend with the clamped history; taps: `row_moments` of the rows of the window."""
+    """Blend with the clamped history; taps: the colour's planes in the window."""
     alpha, k, *limits = numbers
     old, valid = reproject(stencil, guides, table[0], dual, history[0], tests, limits)
     mean, sigma = window_moments(stencil, taps)
@@ -161,25 +128,34 @@ def clamp_and_blend(stencil: Stencil, tests: Tests, taps: Taps, color: list[Floa
 
 
 def window_moments(stencil: Stencil, taps: Taps) -> tuple[list[Float], list[Float]]:
-    """Mean and deviation (3 each) of a window from its rows' moments."""
-    radius = len(taps) // 2
+    """Mean and deviation (3 each) of the window's pixels inside the image; taps row by row."""
+    side = math.isqrt(len(taps))
     row, column = (stencil.Int(i) for i in stencil.pixel())
-    columns = (dr.minimum(column + radius, stencil.width - 1) - dr.maximum(column - radius, 0) + 1)
-    width = stencil.Float(columns)
-    weights = [dr.select(_inside(row, dy, stencil.height), width, 0)
-               for dy in range(-radius, radius + 1)]
-    count = sum(weights, stencil.Float(0))
+    in_row = _inside(stencil, column, side, stencil.width)
+    in_column = _inside(stencil, row, side, stencil.height)
+    zero, norm = stencil.Float(0), 1 / (sum(in_row[1:], in_row[0])
+                                        * sum(in_column[1:], in_column[0]))
     means, sigmas = [], []
     for c in range(3):
-        total = stencil.Float(0)
-        for i, w in enumerate(weights):
-            total = dr.fma(w, taps.at(i)[c], total)
-        mean = total / count
-        square = stencil.Float(0)
-        for i, w in enumerate(weights):
-            d = taps.at(i)[c] - mean
-            square += dr.fma(w * d, d, taps.at(i)[3 + c])
-        means.append(mean)
-        sigmas.append(dr.sqrt(square / count))
-        taps.next()
+        center = taps.at(len(taps) // 2)[c]
+        total, squares = zero, zero
+        for y, of_row in enumerate(in_column):
+            row_total, row_squares = zero, zero
+            for x, counts in enumerate(in_row):
+                d = taps.at(y * side + x)[c] - center
+                counted = d * counts
+                row_total, row_squares = row_total + counted, dr.fma(d, counted, row_squares)
+                taps.next()
+            total, squares = dr.fma(of_row, row_total, total), dr.fma(of_row, row_squares, squares)
+        mean = total * norm
+        variance = dr.fma(-mean, mean, squares * norm)
+        means.append(center + mean)
+        sigmas.append(dr.sqrt(dr.select(variance > 0, variance, 0)))
     return means, sigmas
+
+
+def _inside(stencil: Stencil, position: Any, side: int, size: int) -> list[Float]:
+    """1 for each of the `side` pixels around a position that is in [0, size), else 0."""
+    offsets = range(-(side // 2), side // 2 + 1)
+    return [dr.select((position + i >= 0) & (position + i < size), stencil.Float(1), 0)
+            for i in offsets]

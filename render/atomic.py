@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -36,10 +37,11 @@ def replacing(path: Path) -> Iterator[Path]:
     temporary = temporary_name(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.unlink(missing_ok=True)  # a link put there would lead the write elsewhere
         yield temporary
         os.replace(temporary, path)
     except OSError as error:
-        raise InputError(_explain(path, error)) from error
+        raise InputError(explain(path, error)) from error
     finally:
         # Nothing to remove after a rename; where the folder is out of reach, the error says so.
         with contextlib.suppress(OSError):
@@ -58,16 +60,26 @@ def write_text(path: Path, text: str) -> None:
 
 
 def read_bytes(path: Path) -> bytes:
-    """A whole file; InputError where it is missing or cannot be read."""
+    """A whole file.
+
+    Raises:
+        InputError: missing, unreadable, larger than the memory, or no file: a pipe would wait and
+            a device never end.
+    """
     try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise InputError(f"{path} cannot be read: it is not a file")
         return path.read_bytes()
+    except MemoryError:
+        raise InputError(f"{path} is too large to read into memory") from None
     except FileNotFoundError:
         raise InputError(f"{path} does not exist") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror})") from error
 
 
-def _explain(path: Path, error: OSError) -> str:
+def explain(path: Path, error: OSError) -> str:
+    """Why a file or folder could not be written, and what to do: one sentence."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         return (f"{path} could not be written because the disk is full: free some space and run "
                 "the same command again, what is already written is kept")

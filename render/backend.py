@@ -18,7 +18,7 @@ from pathlib import Path
 from .errors import InputError
 
 OLDEST_LLVM = 16
-_SET_BY_USER = os.environ.get("DRJIT_LIBLLVM_PATH")
+_SET_BY_USER = os.environ.get("DRJIT_LIBLLVM_PATH") or None
 _ADVICE = ("install one with `pip install karellen-llvm-core` (Linux x86-64) or your system's "
            "package manager, or set DRJIT_LIBLLVM_PATH to a libLLVM of version 16 or newer")
 

@@ -52,6 +52,18 @@ _ROWS = (
             "direct light as if nothing cast a shadow, noise-free (`--direct resampled` only)"),
     Channel("visibility", ("visibility",), False, 0.0,
             "share of `unshadowed` that arrives, one noisy sample, may exceed 1 (likewise)"),
+    Channel("specular", _rgb("specular"), False, 0.0,
+            "part of `indirect` whose first direction a glossy or mirror lobe chose"),
+    Channel("hit_distance", ("hit.Z",), False, 0.0,
+            "from the first hit to what the path met next, scene units; 0: nothing"),
+    Channel("hit_id", ("hit.ID",), False, -1.0,
+            "object ID of what the path met next; -1: nothing"),
+    Channel("roughness", ("roughness",), True, 1.0,
+            "GGX alpha of the surface's glossy lobe; 0: a mirror, 1: no such lobe"),
+    Channel("replay", ("replay.direct", "replay.indirect"), False, -1.0,
+            "luminance of some of the last frame's samples, shaded again here; -1: no sample"),
+    Channel("replay_before", ("before.direct", "before.indirect"), False, -1.0,
+            "luminance that the same samples had in the last frame; -1: no sample"),
     Channel("albedo", _rgb("albedo"), True, 0.0,
             "diffuse reflectance in [0, 1]; 1 where the surface has no diffuse part"),
     Channel("normal", ("N.X", "N.Y", "N.Z"), False, 0.0,
@@ -70,6 +82,8 @@ CHANNELS = MappingProxyType({row.name: row for row in _ROWS})
 
 RADIANCE = ("color", "emission", "direct", "indirect")
 SPLIT = ("unshadowed", "visibility")
+GLOSS = ("specular", "hit_distance", "hit_id", "roughness")
+REPLAY = ("replay", "replay_before")
 GBUFFER = ("albedo", "normal", "position", "depth", "id")
 FRAME = RADIANCE + GBUFFER
 REFERENCE = ("color", "variance")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from .atomic import is_temporary
@@ -23,11 +24,37 @@ def remove_sequence(folder: Path) -> None:
     Raises:
         InputError: a file cannot be removed.
     """
-    folders = [path for place in _FOLDERS for path in folder.glob(place) if path.is_dir()]
+    check_links(folder)
+    folders = list(_folders(folder))
     remove_files(folder, folder, *folders)
     for path in folders:
         with contextlib.suppress(OSError):  # not empty
             path.rmdir()
+
+
+def check_links(folder: Path) -> None:
+    """InputError where a folder of a sequence is a link that leads out of it.
+
+    Writing or removing files would then do so elsewhere, where nobody expects it.
+    """
+    inside = folder.resolve()
+    for path in _folders(folder):
+        if path.is_symlink() and inside not in path.resolve().parents:
+            raise InputError(f"{path} is a link to a place outside {folder}: "
+                             "put a folder in its place")
+
+
+def remove_leftovers(folder: Path, *patterns: str) -> None:
+    """Remove what killed writers left half written, of files that a pattern fits; if possible."""
+    for path in (path for pattern in patterns for path in folder.glob(pattern)):
+        if is_temporary(path):
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
+def _folders(folder: Path) -> Iterator[Path]:
+    """The folders in which a sequence keeps its files, the innermost first."""
+    return (path for place in _FOLDERS for path in folder.glob(place) if path.is_dir())
 
 
 def remove_files(folder: Path, *places: Path) -> None:

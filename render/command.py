@@ -11,11 +11,13 @@ from scenes import catalog
 
 from . import backend
 from .arguments import parse_size
-from .channels import FRAME, SPLIT
+from .channels import FRAME, GLOSS, REPLAY, SPLIT
 from .errors import InputError
+from .lock import writing
 from .manifest import parse_frames
+from .memory import require_memory
 from .sequence import Sequence
-from .terminal import progress
+from .terminal import command_line, progress
 
 
 def use(device: str, threads: int | None) -> None:
@@ -33,6 +35,9 @@ frames_option = click.option("--frames", metavar="RANGE",
                              help="As 0:20 (0 to 19), 0:20:2, 7 or 0,5,9; default all.")
 
 
+OFFERED = (*FRAME, *SPLIT, *GLOSS, *REPLAY)
+
+
 def render_options(command):
     """Options of every command that renders."""
     for option in reversed((
@@ -45,15 +50,19 @@ def render_options(command):
         click.option("--antialias", is_flag=True,
                      help="Box-filter the reference over each pixel instead of its centre."),
         click.option("--channels", metavar="NAMES",
-                     help=f"What frames carry, of {', '.join((*FRAME, *SPLIT))}; default all."),
-        click.option("--direct", default="mis", show_default=True,
+                     help=f"What frames carry, of {', '.join(OFFERED)}; default those that "
+                          "say something about the scene; +NAMES: beside those, as +gradient for "
+                          f"{' and '.join(REPLAY)}."),
+        click.option("--direct", default="resampled", show_default=True,
                      type=click.Choice(["mis", "resampled"]),
-                     help="Direct light at the first hit; resampled adds its split into "
-                          "unshadowed light and visibility."),
-        click.option("--sampler", default="pcg", show_default=True,
-                     type=click.Choice(["pcg", "zsobol"]),
-                     help="Random numbers: independent, or with blue-noise error."),
-        click.option("--overwrite", is_flag=True, help="Replace another sequence in the folder."),
+                     help="Direct light at the first hit: as Mitsuba's path, or by resampling all "
+                          "lights, split into unshadowed light and visibility."),
+        click.option("--sampler", default="zsobol", show_default=True,
+                     type=click.Choice(["pcg", "zsobol", "bluenoise"]),
+                     help="Random numbers: independent, or with blue-noise error (two kinds)."),
+        click.option("--overwrite/--resume", default=False,
+                     help="Replace another sequence in the folder, or go on with the same one "
+                          "where it stopped; default resume."),
         device_option, threads_option,
     )):
         command = option(command)
@@ -84,16 +93,17 @@ def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: st
     numbers = parse_frames(frames) if frames else tuple(range(scene.frames))
     if seed < 0:
         raise InputError(f"--seed is {seed}: use 0 or more")
-    names = _channel_names(channels, (*FRAME, *SPLIT) if direct == "resampled" else FRAME)
+    require_memory(height, width)
+    names, added = _channel_names(channels)
     from .job import RenderJob, render_sequence  # imports Mitsuba
 
     job = RenderJob(scene, numbers, height, width, seed, reference_spp, antialias, names,
-                    direct, sampler)
-    with progress() as begin:
+                    direct, sampler, command_line(), added)
+    out = out or Path("data") / scene.name
+    with writing(out, "render", alone=overwrite), progress() as begin:
         rendering = begin(f"render {scene.name} {width}x{height}", len(numbers))
         refining = begin(f"reference, {reference_spp} spp", len(numbers)) if reference_spp else None
-        return render_sequence(job, out or Path("data") / scene.name, overwrite=overwrite,
-                               on_frames=rendering.advance,
+        return render_sequence(job, out, overwrite=overwrite, on_frames=rendering.advance,
                                on_references=refining.advance if refining else _ignore)
 
 
@@ -101,15 +111,19 @@ def _ignore(done: float, note: str) -> None:
     pass
 
 
-def _channel_names(text: str | None, offered: tuple[str, ...]) -> tuple[str, ...]:
+def _channel_names(text: str | None) -> tuple[tuple[str, ...] | None, tuple[str, ...]]:
+    """The channels asked for, None for the default ones, and those to add to them."""
     if text is None:
-        return offered
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    unknown = [name for name in names if name not in offered]
+        return None, ()
+    added = text.startswith("+")
+    names = [name.strip() for name in text[added:].split(",") if name.strip()]
+    names = [n for name in names for n in (REPLAY if name == "gradient" else (name,))]
+    unknown = [name for name in names if name not in OFFERED]
     if unknown or not names:
         raise InputError(f"--channels names {unknown[0] if unknown else 'nothing'}: "
-                         f"use some of {', '.join(offered)}")
-    return tuple(name for name in offered if name in names)
+                         f"use some of {', '.join(OFFERED)}")
+    chosen = tuple(name for name in OFFERED if name in names)
+    return (None, chosen) if added else (chosen, ())
 
 
 FORMATS = click.option("--format", "layout", type=click.Choice(["games202"]), default="games202",
@@ -126,7 +140,8 @@ def import_(folder: Path, out: Path | None, layout: str) -> None:
     from .games202 import import_games202
 
     out = out or Path("data") / folder.resolve().name
-    sequence = import_games202(folder, out)
+    with writing(out, "render"):
+        sequence = import_games202(folder, out, command=command_line())
     click.echo(f"imported {len(sequence.frames)} frames into {sequence.folder}")
 
 

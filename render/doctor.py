@@ -6,12 +6,14 @@ import importlib.metadata
 import os
 import platform
 import sys
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from . import backend
 from .errors import InputError
+from .memory import BASE_BYTES, BYTES_PER_PIXEL, free_memory
 
 PACKAGES = ("mitsuba", "drjit", "OpenEXR", "numpy")
 
@@ -27,7 +29,8 @@ class Finding:
 
 def examine() -> Iterator[Finding]:
     """Look at everything that a command needs; never raises, never crashes the process."""
-    for look in (_python, _packages, _llvm, _cuda, _threads, _kernel_cache, _kernel, _ffmpeg):
+    for look in (_python, _packages, _llvm, _cuda, _threads, _memory, _text, _kernel_cache, _kernel,
+                 _ffmpeg):
         try:
             yield from look()
         except Exception as error:  # a diagnosis must outlive what it diagnoses
@@ -71,15 +74,49 @@ def _threads() -> Iterator[Finding]:
 
     affinity = getattr(os, "sched_getaffinity", None)
     allowed = len(affinity(0)) if affinity else os.cpu_count()
-    yield Finding("threads", "ok", f"{dr.thread_count()} for kernels, {allowed} processors allowed")
+    slow = "; rendering and denoising take turns with all else" if allowed == 1 else ""
+    yield Finding("threads", "note" if slow else "ok", f"{dr.thread_count()} for kernels, "
+                  f"{allowed} processor{'s' * (allowed != 1)} allowed{slow}")
+
+
+def _memory() -> Iterator[Finding]:
+    free = free_memory()
+    if free is None:
+        yield Finding("memory", "note", "how much is free cannot be told here")
+        return
+    fits = int(max(0, free - BASE_BYTES) / BYTES_PER_PIXEL) ** 0.5
+    text = f"{free / 2**20:.0f} MiB free, enough for frames of about {fits:.0f}x{fits:.0f} pixels"
+    if not fits:
+        text = f"{free / 2**20:.0f} MiB free: {BASE_BYTES >> 20} MiB are needed"
+    yield Finding("memory", "ok" if fits > 256 else "note", text)
+
+
+def _text() -> Iterator[Finding]:
+    """File names and output outside ASCII."""
+    names, output = sys.getfilesystemencoding(), sys.stdout.encoding or "none"
+    try:
+        "é日".encode(names)
+        "├é日".encode(output)
+    except (UnicodeError, LookupError):
+        yield Finding("text", "note", f"file names are {names}, output is {output}, so letters "
+                      "outside ASCII are shown as '?': set LC_ALL=C.UTF-8 or PYTHONUTF8=1")
+        return
+    yield Finding("text", "ok", f"file names are {names}, output is {output}")
 
 
 def _kernel_cache() -> Iterator[Finding]:
-    folder = Path(os.environ.get("DRJIT_CACHE_DIR") or Path.home() / ".drjit")
+    chosen = os.environ.get("DRJIT_CACHE_DIR")
+    if not chosen and sys.platform != "win32" and not os.environ.get("HOME"):
+        yield Finding("kernel cache", "note",
+                      "HOME is not set: kernels are compiled anew in every process; set it, or "
+                      "DRJIT_CACHE_DIR to a folder of yours")
+        return
+    folder = Path(chosen or Path.home() / ".drjit").absolute()
     nearest = next(p for p in (folder, *folder.parents) if p.exists())
-    if os.access(nearest, os.W_OK):
-        yield Finding("kernel cache", "ok", str(folder))
-    else:
+    try:
+        with tempfile.TemporaryFile(dir=nearest):
+            yield Finding("kernel cache", "ok", str(folder))
+    except OSError:
         yield Finding("kernel cache", "note",
                       f"{folder} cannot be written: kernels are compiled anew in every process; "
                       "set DRJIT_CACHE_DIR to a folder of yours")

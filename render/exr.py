@@ -180,6 +180,8 @@ def _attributes(data: bytes) -> tuple[dict[str, tuple[str, bytes]], int]:
         name, at = _string(data, at)
         kind, at = _string(data, at)
         size, = struct.unpack_from("<I", data, at)
+        if name in attributes:  # the library might go by the other one
+            raise _Malformed(f"has two {name!r} in its header: make it again")
         if at + 4 + size >= len(data):
             raise IndexError
         attributes[name] = (kind, data[at + 4:at + 4 + size])
@@ -204,6 +206,8 @@ def _channel_list(data: bytes) -> dict[str, np.dtype]:
             raise _Malformed(f"has a channel {name!r} of an unknown type: make it again")
         if (x_step, y_step) != (1, 1):
             raise _Malformed(f"has a subsampled channel {name!r}: save it at full resolution")
+        if name in channels:
+            raise _Malformed(f"has two channels {name!r}: make it again")
         channels[name] = _TYPES[kind]
         at += 16
     if not channels:

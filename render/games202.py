@@ -44,8 +44,10 @@ _MATRIX = 64  # bytes
 
 
 def import_games202(folder: Path | str, out: Path | str, *, scene: str | None = None,
-                    fps: float = 24.0, overwrite: bool = False) -> Sequence:
+                    fps: float = 24.0, overwrite: bool = False, command: str = "") -> Sequence:
     """Read all frames of a folder in the assignment's layout into a new sequence at `out`.
+
+    `command` is the command line, for the manifest.
 
     Raises:
         InputError: no frames, or a file of one is missing, damaged, or disagrees with the rest.
@@ -68,6 +70,7 @@ def import_games202(folder: Path | str, out: Path | str, *, scene: str | None = 
         Manifest, f"the sequence to make of {folder}", source="games202", scene=name,
         fingerprint=digest.hexdigest(), frames=tuple(frames), width=header.width,
         height=header.height, fps=fps, seed=None, channels=tuple(_FILES),
+        commands=(command,) if command else (),
         objects=tuple(f"object_{i:0{digits}d}" for i in range(objects))), overwrite)
     for i in frames:
         if not sequence.has_frame(i):

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 
@@ -17,7 +16,7 @@ from .variant import mi
 
 @dataclass
 class PrimaryHit:
-    """The first hit of a camera ray. `si` is in the stage's space (world minus its origin)."""
+    """The first hit of a camera ray. `si` is in the stage's space."""
 
     stage: Stage
     si: mi.SurfaceInteraction3f
@@ -46,7 +45,8 @@ def normal(hit: PrimaryHit) -> mi.Vector3f:
 
 def position(hit: PrimaryHit) -> mi.Vector3f:
     origin = mi.Vector3f(*(dr.opaque(mi.Float, value) for value in hit.stage.origin.tolist()))
-    return dr.select(hit.si.is_valid(), mi.Vector3f(hit.si.p) + origin, 0)
+    unit = dr.opaque(mi.Float, hit.stage.unit)
+    return dr.select(hit.si.is_valid(), dr.fma(mi.Vector3f(hit.si.p), unit, origin), 0)
 
 
 def depth(hit: PrimaryHit) -> mi.Float:
@@ -54,10 +54,27 @@ def depth(hit: PrimaryHit) -> mi.Float:
 
 
 def object_id(hit: PrimaryHit) -> mi.Int32:
-    valid = hit.si.is_valid()
-    index: Any = dr.reinterpret_array(mi.UInt32, hit.si.shape)
-    number = dr.gather(mi.UInt32, hit.stage.id_from_registry, index, valid)
-    return dr.select(valid, mi.Int32(number), -1)
+    return hit.stage.object_id(dr.reinterpret_array(mi.UInt32, hit.si.shape))
+
+
+def roughness(hit: PrimaryHit) -> mi.Float:
+    """GGX alpha of the glossy lobe, from its density alone, so for any BSDF that has one.
+
+    Along the normal, the density of the mirror direction is D / 4 = 1 / (4 pi alpha^2) for
+    microfacets sampled by visible normals (Walter et al. 2007; exact for GGX and Beckmann).
+    """
+    bsdf = hit.si.bsdf()
+    flags = bsdf.flags()
+    along = mi.Vector3f(0, 0, 1)
+    si = mi.SurfaceInteraction3f(hit.si)
+    si.wi = along
+    glossy = hit.si.is_valid() & mi.has_flag(flags, mi.BSDFFlags.Glossy)
+    context = mi.BSDFContext()
+    context.type_mask = mi.BSDFFlags.Glossy
+    density = bsdf.pdf(context, si, along, glossy)
+    alpha = dr.clip(dr.rsqrt(dr.maximum(4 * dr.pi * density, 1)), 0, 1)
+    mirror = hit.si.is_valid() & mi.has_flag(flags, mi.BSDFFlags.Delta)
+    return dr.select(mirror, 0, dr.select(glossy, alpha, 1))
 
 
 GBUFFER: dict[str, Callable[[PrimaryHit], mi.Float | mi.Vector3f | mi.Color3f | mi.Int32]] = {
@@ -66,4 +83,5 @@ GBUFFER: dict[str, Callable[[PrimaryHit], mi.Float | mi.Vector3f | mi.Color3f | 
     "position": position,
     "depth": depth,
     "id": object_id,
+    "roughness": roughness,
 }

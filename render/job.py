@@ -6,6 +6,7 @@ import datetime
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,9 @@ from scenes.description import Scene
 from scenes.fingerprint import fingerprint
 
 from . import backend
-from .channels import FRAME
+from .errors import InputError
 from .json_file import checked
+from .machine import machine
 from .manifest import Manifest
 from .reference import Progress, pass_sizes, render_reference
 from .renderer import Renderer
@@ -37,9 +39,11 @@ class RenderJob:
         frames: frame numbers. height, width: pixels. seed: of all random numbers.
         reference_spp: samples a pixel of the reference, None for none.
         antialias: the reference is box-filtered over each pixel instead of through its centre.
-        channels: what each frame carries, see `render/channels.py`.
+        channels: what each frame carries, see `render/channels.py`; None: all that says something
+            about this scene. added: channels beside those.
         direct, sampler: the estimator of direct light and the random numbers of the frames, see
-            `render/renderer.py`. (References are always MIS and Sobol.)
+            `render/renderer.py`. (References are always resampled and Sobol.)
+        command: the command line, for the manifest.
     """
 
     scene: Scene
@@ -49,9 +53,21 @@ class RenderJob:
     seed: int = 0
     reference_spp: int | None = None
     antialias: bool = False
-    channels: Sequence[str] = FRAME
-    direct: str = "mis"
-    sampler: str = "pcg"
+    channels: Sequence[str] | None = None
+    direct: str = "resampled"
+    sampler: str = "zsobol"
+    command: str = ""
+    added: Sequence[str] = ()
+
+    @cached_property
+    def renderer(self) -> Renderer:
+        return Renderer(self.scene, self.height, self.width, direct=self.direct,
+                        sampler=self.sampler)
+
+    def channel_names(self) -> tuple[str, ...]:
+        """The channels asked for, or else what the renderer has to say about the scene."""
+        names = self.renderer.channels if self.channels is None else self.channels
+        return tuple(dict.fromkeys((*names, *self.added)))
 
     def manifest(self) -> Manifest:
         return checked(
@@ -61,8 +77,10 @@ class RenderJob:
             seed=self.seed, reference_spp=self.reference_spp, max_depth=self.scene.max_depth,
             direct=self.direct, sampler=self.sampler,
             reference_filter="box" if self.antialias else "centre",
-            channels=tuple(self.channels), objects=self.scene.object_names,
-            device=backend.choose(), versions=versions("mitsuba", "drjit", "numpy"),
+            channels=self.channel_names(), objects=self.scene.object_names,
+            device=backend.choose(), machine=machine(backend.choose()),
+            versions=versions("mitsuba", "drjit", "numpy"),
+            commands=(self.command,) if self.command else (),
             created=datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"))
 
 
@@ -82,37 +100,32 @@ def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
     if job.reference_spp is not None:
         pass_sizes(job.reference_spp)
     sequence = FrameSequence.create(folder, job.manifest(), overwrite)
-    renderer: Renderer | None = None
-
-    def ready() -> Renderer:  # a complete folder needs no scene
-        nonlocal renderer
-        renderer = renderer or Renderer(job.scene, job.height, job.width, direct=job.direct,
-                                        sampler=job.sampler)
-        return renderer
-
     provenance = {"software": f"onespp {versions()['onespp']}", "scene": job.scene.name,
                   "sceneFingerprint": sequence.manifest.fingerprint, "seed": str(job.seed),
                   "maxDepth": str(job.scene.max_depth), "direct": job.direct,
                   "sampler": job.sampler}
-    for done, index in enumerate(job.frames, 1):
-        if not sequence.has_frame(index):
-            frame = ready().frame(index, job.seed, tuple(job.channels))
+    for done, (previous, index) in enumerate(zip([None, *job.frames], job.frames), 1):
+        if not sequence.frame_is_whole(index):
+            frame = job.renderer.frame(index, job.seed, job.channel_names(), previous)
             sequence.write_frame(frame, provenance | {"frame": str(index), "spp": "1"})
         on_frames(done, "")
     if job.reference_spp is not None:
         for done, index in enumerate(job.frames):
             if not _has_reference(sequence, index, job):
-                _render_reference(job, sequence, ready(), index, provenance,
+                _render_reference(job, sequence, index, provenance,
                                   lambda part, done=done: on_references(done + part, ""))
             on_references(done + 1, "")
     return sequence
 
 
 def _has_reference(sequence: FrameSequence, index: int, job: RenderJob) -> bool:
-    return sequence.has_reference(index) and sequence.reference_spp(index) == job.reference_spp
+    try:
+        return sequence.has_reference(index) and sequence.reference_spp(index) == job.reference_spp
+    except InputError:  # damaged: it is made again
+        return False
 
 
-def _render_reference(job: RenderJob, sequence: FrameSequence, renderer: Renderer, index: int,
+def _render_reference(job: RenderJob, sequence: FrameSequence, index: int,
                       provenance: dict[str, str], report: Callable[[float], None]) -> None:
     """One reference; its progress is kept on disk every few seconds and when interrupted."""
     spp = job.reference_spp
@@ -128,11 +141,11 @@ def _render_reference(job: RenderJob, sequence: FrameSequence, renderer: Rendere
             saved = time.monotonic()
 
     try:
-        reference = render_reference(renderer, index, job.seed, spp,
+        reference = render_reference(job.renderer, index, job.seed, spp,
                                      antialias=job.antialias, progress=progress,
                                      after_pass=after_pass)
     except KeyboardInterrupt:
-        if progress.passes:
+        if progress.passes and _fits(job, progress):
             _save_progress(job, sequence, index, progress)
         raise
     sequence.write_reference(index, reference, provenance | {
@@ -151,9 +164,19 @@ def _saved_progress(job: RenderJob, sequence: FrameSequence, index: int) -> Prog
     saved = sequence.read_partial(index)
     if saved is None or saved.keys() != _SAVED:
         return None
-    size = (job.height, job.width, 3)
-    if (saved["total"].shape != size or saved["squares"].shape != size
-            or int(saved["spp"]) != job.reference_spp or bool(saved["antialias"]) != job.antialias):
+    sums = saved["total"], saved["squares"]
+    counts = [saved[name] for name in ("passes", "samples", "spp", "antialias")]
+    if (any(array.shape != (job.height, job.width, 3) or array.dtype != np.float64
+            for array in sums) or any(n.shape != () or n.dtype.kind not in "biu" for n in counts)):
         return None
-    return Progress(saved["total"].astype(np.float64), saved["squares"].astype(np.float64),
-                    int(saved["passes"]), int(saved["samples"]))
+    passes, samples, spp, antialias = map(int, counts)
+    progress = Progress(*sums, passes, samples)
+    same = spp == job.reference_spp and antialias == job.antialias
+    return progress if same and _fits(job, progress) else None
+
+
+def _fits(job: RenderJob, progress: Progress) -> bool:
+    """Whether it is the state between two passes, and not one torn by an interrupt."""
+    sizes = pass_sizes(job.reference_spp or 0, job.height * job.width)
+    return (0 <= progress.passes <= len(sizes)
+            and progress.samples == sum(sizes[:progress.passes]))

@@ -69,7 +69,8 @@ class Manifest(JsonFile):
     samples go through pixel centres, as a frame's do, "box" where they are spread over the pixel.
     `seed` and `max_depth` are None for imports, where they are not known. `objects` are names
     in order of ID. `fingerprint` is a hash of what the scene describes (or an import holds), so
-    that an edited scene is not taken for the old one.
+    that an edited scene is not taken for the old one. `commands` are the command lines that made
+    it, as they were typed, in order; `machine` is that of the first.
     """
 
     format: Annotated[int, Field(ge=FORMAT, le=FORMAT)] = FORMAT
@@ -94,6 +95,8 @@ class Manifest(JsonFile):
     device: str = ""
     versions: dict[str, str] = Field(default_factory=dict)
     created: str = ""
+    machine: str = ""
+    commands: tuple[str, ...] = ()
 
     @field_validator("channels")
     @classmethod
@@ -127,7 +130,8 @@ class Run(JsonFile):
 
     `ms` holds milliseconds by frame number, reading and writing of files excluded; `first_ms`
     the first call's, compilation included; `peak_mb` the most memory that the calls took, in MiB.
-    All are empty where they are not known.
+    `energy_kept` is the share of the input's mean radiance that outlier removal let through.
+    `command` is the command line as it was typed. All are empty where they are not known.
     """
 
     method: Name
@@ -135,9 +139,12 @@ class Run(JsonFile):
     device: str = ""
     threads: int | None = None
     versions: dict[str, str] = Field(default_factory=dict)
+    machine: str = ""
+    command: str = ""
     first_ms: FiniteFloat | None = None
     ms: dict[int, FiniteFloat] = Field(default_factory=dict)
     peak_mb: FiniteFloat | None = None
+    energy_kept: FiniteFloat | None = None
 
 
 def check_name(name: str, what: str) -> str:

@@ -5,7 +5,10 @@ solid angle; `depth`, segments behind the current vertex.
 
 The estimator is that of Mitsuba's `path` without Russian roulette (a scene's paths are short).
 It differs in what it returns: radiance split by the number of scattering events, from one primary
-hit that the G-buffer shares.
+hit that the G-buffer shares; and what a reflection needs: the part of indirect light whose first
+direction was sampled from a glossy or mirror lobe, and what that path met next. Where a surface has
+several lobes, that is an unbiased share of the whole (each direction counts as glossy with the
+probability that the glossy lobe chose it), not the glossy lobe's value alone: it costs nothing.
 """
 
 from __future__ import annotations
@@ -24,12 +27,18 @@ from .variant import mi
 class Radiance:
     """Radiance toward the camera, linear, by scattering events: none, one, more.
 
+    specular: the part of `indirect` that left the first hit through a glossy or mirror lobe.
+    hit_distance: from the first hit to the next, 0 if there is none. hit_shape: the shape met
+    there, its index in the JIT registry, 0 if there is none.
     `unshadowed` and `visibility` split direct light, if it was resampled: see `render/lights.py`.
     """
 
     emission: mi.Color3f
     direct: mi.Color3f
     indirect: mi.Color3f
+    specular: mi.Color3f
+    hit_distance: mi.Float
+    hit_shape: mi.UInt32
     unshadowed: mi.Color3f | None = None
     visibility: mi.Float | None = None
 
@@ -49,6 +58,8 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     ray = mi.Ray3f(ray)
     pi = mi.PreliminaryIntersection3f(pi)
     emission, direct, indirect = mi.Color3f(0), mi.Color3f(0), mi.Color3f(0)
+    specular, through_gloss = mi.Color3f(0), mi.Bool(False)
+    hit_distance, hit_shape = mi.Float(0), mi.UInt32(0)
     arrived = mi.Color3f(0)  # direct light, but for what purely specular lobes reflect
     beta = mi.Color3f(1)
     depth = mi.UInt32(0)
@@ -91,24 +102,31 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
 
         emission += dr.select(depth == 0, found, 0)
         direct += dr.select(depth == 1, found, 0) + dr.select(depth == 0, sought, 0)
-        indirect += dr.select(depth >= 2, found, 0) + dr.select(depth >= 1, sought, 0)
+        further = dr.select(depth >= 2, found, 0) + dr.select(depth >= 1, sought, 0)
+        indirect += further
+        specular += dr.select(through_gloss, further, 0)
 
         ray = si.spawn_ray(si.to_world(bsdf_sample.wo))
         beta *= bsdf_weight
         bsdf_pdf = mi.Float(bsdf_sample.pdf)
         from_delta = mi.has_flag(bsdf_sample.sampled_type, mi.BSDFFlags.Delta)
+        through_gloss |= (depth == 0) & (from_delta | mi.has_flag(bsdf_sample.sampled_type,
+                                                                  mi.BSDFFlags.Glossy))
         previous_p = mi.Point3f(si.p)
         active = inner & (dr.max(beta) > 0)
         depth += 1
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        met = active & (depth == 1) & pi.is_valid()
+        hit_distance = dr.select(met, pi.t, hit_distance)
+        hit_shape = dr.select(met, dr.reinterpret_array(mi.UInt32, pi.shape), hit_shape)
 
-    return _radiance(emission, direct, indirect, arrived, split)
+    radiance = Radiance(emission, direct, indirect, specular, hit_distance, hit_shape)
+    return _with_split(radiance, arrived, split)
 
 
-def _radiance(emission: mi.Color3f, direct: mi.Color3f, indirect: mi.Color3f,
-              arrived: mi.Color3f, split: DirectLight | None) -> Radiance:
-    if split is None:
-        return Radiance(emission, direct, indirect)
-    possible = mi.luminance(split.unshadowed)
-    visibility = dr.select(possible > 0, mi.luminance(arrived) / possible, 0)
-    return Radiance(emission, direct, indirect, split.unshadowed, visibility)
+def _with_split(radiance: Radiance, arrived: mi.Color3f, split: DirectLight | None) -> Radiance:
+    if split is not None:
+        possible = mi.luminance(split.unshadowed)
+        radiance.unshadowed = split.unshadowed
+        radiance.visibility = dr.select(possible > 0, mi.luminance(arrived) / possible, 0)
+    return radiance

@@ -36,29 +36,31 @@ class PixelRays:
     """Rays through points of the image plane; all members are opaque (no new kernel a frame).
 
     The unnormalised direction of the ray through screen point (x, y) is
-    `columns @ (x, y, 1)`; its camera-space z is 1.
+    `columns @ (x, y, 1)`; its camera-space z is 1. `unit`: world units in one of the stage's.
     """
 
+    unit: mi.Float
     origin: mi.Point3f
     columns: tuple[mi.Vector3f, mi.Vector3f, mi.Vector3f]
 
     def at(self, x: mi.Float, y: mi.Float) -> tuple[mi.Ray3f, mi.Float]:
-        """The ray, and the camera-space depth of one unit of its length."""
+        """The ray, and the camera-space depth, in world units, of one unit of its length."""
         cx, cy, c1 = self.columns
         direction = dr.fma(cx, x, dr.fma(cy, y, c1))
-        depth_per_length = dr.rcp(dr.norm(direction))
-        return mi.Ray3f(self.origin, direction * depth_per_length), depth_per_length
+        scale = dr.rcp(dr.norm(direction))
+        return mi.Ray3f(self.origin, direction * scale), scale * self.unit
 
 
 def pixel_rays(stage: Stage, height: int, width: int) -> PixelRays:
-    """The camera's rays at the stage's frame, in the stage's space (world minus origin)."""
+    """The camera's rays at the stage's frame, in the stage's space."""
     camera = stage.description.camera
     world_from_camera = camera.world_from_camera_at(stage.frame)
     projection = camera.screen_from_camera(height, width)[np.ix_([0, 1, 3], [0, 1, 2])]
     direction_from_screen = world_from_camera[:3, :3] @ np.linalg.inv(projection)
-    origin = world_from_camera[:3, 3] - stage.origin
+    origin = (world_from_camera[:3, 3] - stage.origin) / stage.unit
     columns = [_opaque(column) for column in direction_from_screen.T]
-    return PixelRays(mi.Point3f(_opaque(origin)), (columns[0], columns[1], columns[2]))
+    return PixelRays(dr.opaque(mi.Float, stage.unit), mi.Point3f(_opaque(origin)),
+                     (columns[0], columns[1], columns[2]))
 
 
 def _opaque(vector: np.ndarray) -> mi.Vector3f:

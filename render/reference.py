@@ -45,9 +45,9 @@ class Progress:
 
     def add(self, sample_sum: np.ndarray, samples: int) -> None:
         total = sample_sum.astype(np.float64)
+        self.passes += 1  # first, and samples last: an interrupt between leaves them at odds
         self.total += total
         self.squares += total * total / samples
-        self.passes += 1
         self.samples += samples
 
     def reference(self) -> Reference:

@@ -10,15 +10,17 @@ import numpy as np
 
 from scenes.description import Scene
 
-from .channels import FRAME, RADIANCE, SPLIT
+from .channels import FRAME, GLOSS, RADIANCE, REPLAY, SPLIT
 from .errors import InputError
 from .frame import Frame
 from .gbuffer import GBUFFER, PrimaryHit
+from .gradient import replay
 from .path import trace
 from .rays import camera_matrices, pixel_rays
 from .sampler import (
     FRAME_STREAM,
     REFERENCE_STREAM,
+    BlueNoise,
     Keys,
     Pcg,
     Sampler,
@@ -34,6 +36,7 @@ SAMPLERS: dict[str, Callable[[Keys, Any, int], Sampler]] = {
     "pcg": lambda keys, pixel, width: Pcg(keys, pixel),
     "zsobol": lambda keys, pixel, width: Sobol(keys, mi.UInt32(0),
                                                z_order(pixel % width, pixel // width)),
+    "bluenoise": lambda keys, pixel, width: BlueNoise(keys, pixel % width, pixel // width),
 }
 
 
@@ -56,18 +59,28 @@ class Renderer:
         self.scene, self.height, self.width = scene, height, width
         self.stage = Stage(scene)
 
-    def frame(self, index: int, seed: int = 0, channels: Sequence[str] = FRAME) -> Frame:
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """All channels of its frames that are not the same in any scene of this kind."""
+        return (FRAME + (SPLIT if self.direct == "resampled" else ())
+                + (GLOSS if self.stage.glossy else ()))
+
+    def frame(self, index: int, seed: int = 0, channels: Sequence[str] = FRAME,
+              previous: int | None = None) -> Frame:
         """One frame at 1 spp: one kernel, only the channels asked for.
 
-        The result depends on (scene, index, seed, size) alone.
+        The result depends on (scene, index, seed, size) alone, and the channels of `gradient.py`
+        on `previous`, the frame before it (None: there is none).
         """
         if self.direct != "resampled" and set(channels) & set(SPLIT):
             raise InputError(f"the channels {' and '.join(SPLIT)} need --direct resampled")
+        replayed = replay(self, index, previous, seed) if set(channels) & set(REPLAY) else {}
         self.stage.pose(index)
-        planes = self._trace_frame(index, seed, channels)
+        planes = self._trace_frame(index, seed, [c for c in channels if c not in REPLAY])
         dr.eval(planes)
         matrices = camera_matrices(self.scene.camera, index, self.height, self.width)
         images = {name: self._image(value) for name, value in planes.items()}
+        images |= {name: image for name, image in replayed.items() if name in channels}
         return Frame(index, images, matrices.camera_from_world, matrices.screen_from_world,
                      self.stage.world_from_object())
 
@@ -88,6 +101,10 @@ class Renderer:
         dr.eval(color)
         return self._image(color)
 
+    def new_sampler(self, keys: Keys, pixel: mi.UInt32) -> Sampler:
+        """The random numbers of pixels."""
+        return SAMPLERS[self.sampler](keys, pixel, self.width)
+
     def _trace_frame(self, index: int, seed: int, channels: Sequence[str]) -> dict:
         with dr.suspend_grad():
             scene = self.stage.mi_scene
@@ -96,9 +113,8 @@ class Renderer:
             ray, depth_per_length = rays.at(*self._centres(pixel))
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
             planes = {}
-            if set(channels) & {*RADIANCE, *SPLIT}:
-                keys = keys_from_seed(seed, FRAME_STREAM, index)
-                sampler = SAMPLERS[self.sampler](keys, pixel, self.width)
+            if set(channels) & {*RADIANCE, *SPLIT, *GLOSS}:
+                sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
                 radiance = trace(scene, ray, pi, sampler, self.scene.max_depth,
                                  self.direct == "resampled")
                 planes = {
@@ -108,6 +124,9 @@ class Renderer:
                     "indirect": radiance.indirect,
                     "unshadowed": radiance.unshadowed,
                     "visibility": radiance.visibility,
+                    "specular": radiance.specular,
+                    "hit_distance": radiance.hit_distance * dr.opaque(mi.Float, self.stage.unit),
+                    "hit_id": self.stage.object_id(radiance.hit_shape),
                 }
             if set(channels) & set(GBUFFER):
                 hit = PrimaryHit(self.stage, pi.compute_surface_interaction(ray), depth_per_length)

@@ -15,9 +15,10 @@ from typing import ClassVar, Protocol
 import drjit as dr
 import numpy as np
 
+from . import bluenoise
 from .variant import mi
 
-FRAME_STREAM, REFERENCE_STREAM = 0, 1
+FRAME_STREAM, REFERENCE_STREAM, GRADIENT_STREAM = 0, 1, 2
 
 Keys = tuple[mi.UInt32, mi.UInt32]
 
@@ -102,6 +103,46 @@ class Sobol:
         a, b = mi.sample_tea_32(self.seed, self.dimension)
         self.dimension += 1
         return a, b, a ^ dr.brev(b)
+
+
+class BlueNoise:
+    """Numbers that differ most between neighbouring pixels: a shifted mask, a dimension each.
+
+    A dimension reads the mask from an offset of its own and adds, modulo 1, a number of its own,
+    both new in every frame; so each number alone is uniform, and a frame's error is blue noise.
+
+    Source: Georgiev and Fajardo 2016, "Blue-noise dithered sampling". Differs: the offsets are
+    new in each frame instead of the same numbers moving on by R2 steps.
+    """
+
+    DRJIT_STRUCT: ClassVar[dict] = {"mask": mi.UInt32, "x": mi.UInt32, "y": mi.UInt32,
+                                    "key": mi.UInt32, "fine": mi.UInt32, "dimension": mi.UInt32}
+
+    def __init__(self, keys: Keys | None = None, x: mi.UInt32 | None = None,
+                 y: mi.UInt32 | None = None) -> None:
+        self.mask, self.x, self.y = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
+        self.key, self.fine, self.dimension = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
+        if keys is not None:
+            self.mask = mi.UInt32(bluenoise.mask().astype(np.uint32).ravel())
+            self.x, self.y = mi.UInt32(x), mi.UInt32(y)
+            a, b = mi.sample_tea_32(keys[0], keys[1])
+            self.key = mi.UInt32(a ^ b)
+            self.fine, _ = mi.sample_tea_32(self.x | (self.y << 16), self.key)
+
+    def next_1d(self) -> mi.Float:
+        side = bluenoise.SIDE
+        place, offset = mi.sample_tea_32(self.key, self.dimension)
+        jitter, _ = mi.sample_tea_32(self.fine, self.dimension)
+        at = ((self.y + (place >> 16)) % side) * side + (self.x + place) % side
+        rank = dr.gather(mi.UInt32, self.mask, at)
+        self.dimension += 1
+        # 32-bit fractions: they wrap around by themselves.
+        cell = (1 << 32) // (side * side)
+        return _unit(rank * cell + jitter // (side * side) + offset)
+
+    def next_2d(self) -> mi.Point2f:
+        x = self.next_1d()
+        return mi.Point2f(x, self.next_1d())
 
 
 def z_order(x: mi.UInt32, y: mi.UInt32) -> mi.UInt32:

@@ -4,7 +4,10 @@ Traps that this file exists for:
 - `load_dict` reorders and merges shapes unless `parallel` and `optimize` are off;
 - a shape's index in the JIT registry is not its index in the scene, hence `id_from_registry`;
 - Mitsuba computes in float32, so everything is placed relative to `origin` (where the camera is
-  at frame 0): a scene far from the world's origin renders as well as one at it.
+  at frame 0): a scene far from the world's origin renders as well as one at it;
+- a ray starts 1.5e-4 (1 + distance from the origin) above its surface, more than a tiny scene is
+  wide, so everything is divided by `unit`, a power of two that is 1 but in small scenes;
+- Mitsuba inverts matrices, so what is scaled to nothing is placed as a dot too small to be hit.
 """
 
 from __future__ import annotations
@@ -19,6 +22,9 @@ from scenes.description import Cylinder, Disk, Mesh, Rectangle, Scene, SceneErro
 
 from .variant import mi
 
+_SMALL = 0.125   # a scene that reaches less far has a unit of its own
+_DOT = 1e-7      # half the size of what has none, in stage units
+
 _ANALYTIC = {Sphere: "sphere", Rectangle: "rectangle", Disk: "disk", Cylinder: "cylinder"}
 
 
@@ -26,8 +32,9 @@ class Stage:
     """The Mitsuba scene of a description.
 
     Attributes:
-        description: the scene. mi_scene: the live `mi.Scene`, in world space minus `origin`.
-        origin: (3,) float64, world space.
+        description: the scene. mi_scene: the live `mi.Scene`, in stage space.
+        origin: (3,) float64, world space. unit: a stage unit's length in world units; a point of
+            the world is `origin + unit * (its point in stage space)`.
         id_from_registry: UInt32 table, registry index of a shape -> object ID.
         frame: the frame it is posed at.
     """
@@ -35,6 +42,7 @@ class Stage:
     def __init__(self, description: Scene, frame: float = 0) -> None:
         self.description = description
         self.origin = description.camera.world_from_camera_at(0)[:3, 3].copy()
+        self.unit = _unit(description, self.origin)
         self.frame = frame
         self._mirrored = {shape.name: _mirrors(shape.world_from_object_at(frame))
                           for shape in description.shapes}
@@ -42,15 +50,18 @@ class Stage:
         for shape in description.shapes:
             scene[shape.name] = self._load_shape(shape, frame)
         if description.environment is not None:
-            scene["environment"] = {"type": "constant", "radiance": _rgb(description.environment)}
+            scene["environment"] = _environment(description.environment)
         self.mi_scene = mi.load_dict(scene, parallel=False, optimize=False)
         self._parameters = mi.traverse(self.mi_scene)
         self.id_from_registry = self._registry_table()
+        self._move(frame)  # an updated scene differs from a loaded one by roundings of its rays
 
     def pose(self, frame: float) -> None:
         """Move what moves to where it is at `frame`. Nothing happens if it is there already."""
-        if frame == self.frame:
-            return
+        if frame != self.frame:
+            self._move(frame)
+
+    def _move(self, frame: float) -> None:
         for shape in self.description.shapes:
             if shape.moves:
                 self._place(shape, shape.world_from_object_at(frame))
@@ -64,12 +75,39 @@ class Stage:
         """(n, 4, 4) float64 by object ID, at the current frame."""
         return np.stack([s.world_from_object_at(self.frame) for s in self.description.shapes])
 
+    def stage_from_stage(self, world_from_object: np.ndarray) -> np.ndarray:
+        """(n, 4, 4) float64 by object ID: what objects' points at other places move by to here.
+
+        Exactly the identity for an object at rest; NaN for one that was flat there.
+        """
+        moves = []
+        for then, now in zip(world_from_object, self.world_from_object(), strict=True):
+            if np.array_equal(then, now):
+                moves.append(np.eye(4))
+            elif np.linalg.det(then) == 0:
+                moves.append(np.full((4, 4), np.nan))
+            else:
+                moves.append(self._local(now) @ np.linalg.inv(self._local(then)))
+        return np.stack(moves)
+
+    def object_id(self, registry_index: Any) -> mi.Int32:
+        """Object IDs of shapes by their index in the JIT registry; 0 is no shape, -1."""
+        valid = registry_index != 0
+        number = dr.gather(mi.UInt32, self.id_from_registry, registry_index, valid)
+        return dr.select(valid, mi.Int32(number), -1)
+
+    @property
+    def glossy(self) -> bool:
+        """Whether any material reflects otherwise than diffusely."""
+        return any(mi.has_flag(shape.bsdf().flags(), lobe) for shape in self.mi_scene.shapes()
+                   for lobe in (mi.BSDFFlags.Glossy, mi.BSDFFlags.Delta))
+
     def sensor(self, height: int, width: int) -> mi.Sensor:
         """Mitsuba's own pinhole camera at the same place, for comparisons with its integrators."""
         camera = self.description.camera
-        # Mitsuba's camera has x to the left and y up.
+        # Mitsuba's camera has x to the left and y up, and no scale.
         world_from_sensor = self._local(camera.world_from_camera_at(self.frame)) @ np.diag(
-            [-1.0, -1.0, 1.0, 1.0])
+            [-self.unit, -self.unit, self.unit, 1.0])
         return mi.load_dict({
             "type": "perspective", "fov": camera.fov, "fov_axis": "y",
             "near_clip": 1e-4, "far_clip": 1e6,
@@ -79,9 +117,10 @@ class Stage:
         })
 
     def _local(self, matrix: np.ndarray) -> np.ndarray:
-        """The same transform into world space minus `origin`."""
+        """The same transform into stage space."""
         local = matrix.copy()
         local[:3, 3] -= self.origin
+        local[:3] /= self.unit
         return local
 
     def _load_shape(self, shape: Shape, frame: float) -> Any:
@@ -141,8 +180,32 @@ def _mirrors(matrix: np.ndarray) -> bool:
     return bool(np.linalg.det(matrix[:3, :3]) < 0)
 
 
+def _unit(description: Scene, eye: np.ndarray) -> float:
+    """The power of two nearest to how far things reach from the camera at frame 0 (median)."""
+    reach = []
+    for shape in description.shapes:
+        place = shape.world_from_object_at(0)
+        mesh = shape.geometry.vertices if isinstance(shape.geometry, Mesh) else np.eye(3)
+        points = mesh @ place[:3, :3].T + place[:3, 3]
+        reach.append(np.linalg.norm(points - eye, axis=1).max())
+    typical = float(np.median(reach))
+    return 2.0**round(np.log2(typical)) if 0 < typical < _SMALL else 1.0
+
+
+def _environment(radiance: Any) -> dict[str, Any]:
+    if not isinstance(radiance, np.ndarray):
+        return {"type": "constant", "radiance": _rgb(radiance)}
+    return {"type": "envmap", "bitmap": mi.Bitmap(radiance.astype(np.float32))}
+
+
 def _checked(shape: Shape, matrix: np.ndarray) -> np.ndarray:
-    """The matrix, if Mitsuba's analytic shapes can take it."""
+    """The matrix, if Mitsuba's analytic shapes can take it; a dot, if it leaves no size."""
+    if np.abs(matrix[:3, :3]).max() < _DOT:
+        matrix = matrix.copy()
+        matrix[:3, :3] = _DOT * np.eye(3)
+    elif np.linalg.det(matrix[:3, :3]) == 0:
+        raise SceneError(f"shape '{shape.name}' is a {type(shape.geometry).__name__} that its "
+                         "matrix flattens: scale all its axes by more than 0, or use a mesh")
     if isinstance(shape.geometry, Sphere | Cylinder):
         sizes = np.linalg.norm(matrix[:3, :3], axis=0)
         if sizes.max() > sizes.min() * (1 + 1e-6):
@@ -160,11 +223,16 @@ def _placed(mesh: Mesh, matrix: np.ndarray) -> dict[str, Any]:
         "faces": mi.UInt32(np.ascontiguousarray(faces).ravel()),
     }
     if mesh.normals is not None:
-        cofactors = np.linalg.inv(linear).T
-        normals = mesh.normals @ cofactors.T
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        placed["vertex_normals"] = _buffer(normals)
+        normals = mesh.normals @ _cofactors(linear).T * (-1 if _mirrors(matrix) else 1)
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        placed["vertex_normals"] = _buffer(normals / np.where(lengths > 0, lengths, 1))
     return placed
+
+
+def _cofactors(linear: np.ndarray) -> np.ndarray:
+    """det(A) A^-T, which a matrix that cannot be inverted has too."""
+    a, b, c = linear.T / max(np.abs(linear).max(), 1e-300)  # of any size: no under- or overflow
+    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
 
 
 def _buffer(array: np.ndarray) -> mi.Float:

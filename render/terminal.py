@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import shlex
 import signal
 import sys
 import time
@@ -33,11 +34,12 @@ class _Stop:
     next step. A second signal does not wait.
     """
 
-    asked = False
+    asked = at_once = False
 
     @classmethod
     def ask(cls, *_: object) -> None:
         if cls.asked:
+            cls.at_once = True
             raise KeyboardInterrupt
         cls.asked = True
         click.echo("onespp: stopping after this step (again: at once)", err=True)
@@ -110,29 +112,44 @@ def run(command: click.Command, arguments: Sequence[str] | None = None,
     """
     from scenes.description import SceneError
 
-    _Stop.asked = False
+    _Stop.asked = _Stop.at_once = False
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _Stop.ask)
+    typed = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        command.main(args=list(arguments) if arguments is not None else None, prog_name=name,
-                     standalone_mode=False)
+        command.main(args=typed, prog_name=name, standalone_mode=False,
+                     obj=readable(shlex.join([*name.split(), *typed])))
     except click.ClickException as error:
         error.show()
         sys.exit(BAD_INPUT)
     except (InputError, SceneError) as error:
         _stop(str(error))
     except (click.Abort, KeyboardInterrupt):
-        click.echo("onespp: stopped; what was finished is kept, and the same command goes on "
-                   "from there", err=True)
-        sys.exit(INTERRUPTED)
+        _interrupted()
+    except MemoryError:
+        _stop("there is not enough memory: use a smaller --size, or fewer --channels; what was "
+              "finished is kept")
     except BrokenPipeError:
         sys.stderr.close()  # the reader of our output has gone, as in `onespp ... | head`
         sys.exit(0)
-    except OSError as error:
-        if error.errno not in _REASONS:
+    except Exception as error:
+        if _Stop.at_once:  # what an interrupt becomes inside an extension's import, say
+            _interrupted()
+        if not isinstance(error, OSError) or error.errno not in _REASONS:
             raise
         where = f" at {error.filename}" if error.filename else ""
         _stop(_REASONS[error.errno].format(where=where))
+
+
+def readable(typed: str) -> str:
+    """Text from the command line as UTF-8 can hold it, whatever bytes and locale it came in."""
+    return typed.encode(errors="surrogateescape").decode(errors="replace")
+
+
+def command_line() -> str:
+    """The command that runs, as it was typed, quoted for a shell; "" where none was."""
+    context = click.get_current_context(silent=True)
+    return (context.find_root().obj or "") if context else ""
 
 
 _REASONS = {
@@ -146,6 +163,12 @@ _REASONS = {
     errno.EFBIG: "a file would be larger than allowed{where}: choose another --out",
     errno.EIO: "the disk reported an error{where}: check it, then run the same command again",
 }
+
+
+def _interrupted() -> None:
+    click.echo("onespp: stopped; what was finished is kept, and the same command goes on "
+               "from there", err=True)
+    sys.exit(INTERRUPTED)
 
 
 def _stop(sentence: str) -> None:

@@ -35,7 +35,7 @@ def _walls() -> list[Shape]:
         return Shape(name, Rectangle(), diffuse(color), turn @ translate((0, 0, -1)))
 
     x, y = (1, 0, 0), (0, 1, 0)
-    light = translate((0, 0.99, 0)) @ rotate(x, 90) @ scale((0.4, 0.4, 1))
+    light = translate((0, 0.998, 0)) @ rotate(x, 90) @ scale((0.4, 0.4, 1))
     return [
         wall("back_wall", WHITE, np.eye(4)),
         wall("left_wall", RED, rotate(y, 90)),

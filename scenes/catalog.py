@@ -1,6 +1,7 @@
 """The scenes there are, and how one of your own is found.
 
-To add a scene: one file with a function that returns it, and one row here.
+To add a scene: one file with a function that returns it, and one row here. (The hard ones, which
+are for testing, have their table in `scenes/hard`, and are called `hard/NAME`.)
 """
 
 from __future__ import annotations
@@ -16,12 +17,14 @@ import numpy as np
 
 from .box import box
 from .description import Scene, SceneError
+from .hard import HARD
 from .room import room
 
 SCENES: dict[str, Callable[[], Scene]] = {
     "box": box,
     "room": room,
 }
+_HARD = "hard/"
 
 
 def load(name: str) -> Scene:
@@ -36,6 +39,8 @@ def load(name: str) -> Scene:
     """
     if name in SCENES:
         return SCENES[name]()
+    if name.startswith(_HARD) and name[len(_HARD):] in HARD:
+        return HARD[name[len(_HARD):]].make()
     if not name.endswith(".py"):
         raise SceneError(_unknown(name))
     path = Path(name)
@@ -53,20 +58,26 @@ def _scene_of(module: dict[str, Any]) -> Scene:
     if not isinstance(made, Scene):
         raise SceneError("there is no scene here: add a function `scene()` that returns a "
                          "scenes.description.Scene")
+    if not made.name or Path(made.name).name != made.name or not made.name.isprintable():
+        raise SceneError(f"the scene's name is {made.name[:40]!r}: files are named after it, so "
+                         "use letters, digits and spaces")
     for frame in (0, made.frames - 1):
         places = {shape.name: shape.world_from_object_at(frame) for shape in made.shapes}
         for name, place in (("camera", made.camera.world_from_camera_at(frame)), *places.items()):
-            if place.shape != (4, 4) or not np.isfinite(place).all() or np.linalg.det(place) == 0:
-                raise SceneError(f"the place of '{name}' in frame {frame} is not an invertible "
-                                 "4x4 matrix of numbers")
+            if place.shape != (4, 4) or not np.isfinite(place).all():
+                raise SceneError(f"the place of '{name}' in frame {frame} is not a 4x4 matrix of "
+                                 "numbers")
+        if np.linalg.det(made.camera.world_from_camera_at(frame)) == 0:
+            raise SceneError(f"the place of 'camera' in frame {frame} cannot be inverted")
     return made
 
 
 def _unknown(name: str) -> str:
-    close = difflib.get_close_matches(name, SCENES, n=1)
+    known = (*SCENES, *(_HARD + hard for hard in HARD))
+    close = difflib.get_close_matches(name, known, n=1)
     hint = f"did you mean '{close[0]}'? " if close else ""
     return (f"unknown scene '{name}': {hint}there are {', '.join(sorted(SCENES))}, "
-            "or give the path of a .py file")
+            f"{_HARD}NAME (`onespp scenes` lists them), or give the path of a .py file")
 
 
 def _blame(path: Path, error: BaseException) -> str:

@@ -164,7 +164,8 @@ class Scene:
         width, height: default size in pixels.
         max_depth: longest path in segments, camera ray included (2: direct light only),
             as in Mitsuba's `path`.
-        environment: radiance (r, g, b) of everything that is not a shape, or None.
+        environment: radiance of everything that is not a shape: (r, g, b), or an (h, w, 3) image
+            by latitude (from +y down) and longitude, or None.
     """
 
     name: str
@@ -176,7 +177,7 @@ class Scene:
     height: int
     max_depth: int = 6
     fps: int = 24
-    environment: Color | None = None
+    environment: Color | np.ndarray | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "shapes", tuple(sorted(self.shapes, key=lambda s: s.name)))
@@ -190,6 +191,11 @@ class Scene:
             if getattr(self, name) < 1:
                 raise SceneError(f"scene '{self.name}' has {name} = {getattr(self, name)}: "
                                  "use 1 or more")
+        if isinstance(self.environment, np.ndarray):
+            shape = self.environment.shape
+            if len(shape) != 3 or shape[2] != 3 or not np.isfinite(self.environment).all():
+                raise SceneError(f"scene '{self.name}' has an environment image of shape {shape}: "
+                                 "use (h, w, 3), all of it finite")
         if self.environment is None and not any(shape.emission for shape in self.shapes):
             raise SceneError(f"scene '{self.name}' has no light: give a shape an emission, "
                              "or the scene an environment")

@@ -63,7 +63,9 @@ def make_frame(height: int, width: int, *, index: int = 0, camera: np.ndarray | 
     camera_from_world = np.linalg.inv(world_from_origin @ camera)
     images = {"color": texture if color is None else color, "normal": normal,
               "position": position, "depth": depth,
-              "albedo": np.where(hit[..., None], [0.5] * 3, 0)}
+              "albedo": np.where(hit[..., None], [0.5] * 3, 0),
+              "replay": np.full((height, width, 2), -1.0),
+              "replay_before": np.full((height, width, 2), -1.0)}
     return Frame(index, {**{k: v.astype(np.float32) for k, v in images.items()},
                          "id": id_.astype(np.int32)},
                  camera_from_world, screen_from_camera @ camera_from_world,

@@ -1,11 +1,17 @@
+import io
 import json
+from types import SimpleNamespace
+from typing import Any
 
+import drjit as dr
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from rich.console import Console
 
 import onespp
-from denoise.bench import KERNELS, max_error
+from denoise.bench import KERNELS, Scaling, max_error, measure_one_thread, scaling
+from denoise.bench_table import print_scaling
 from denoise.methods import METHODS
 from denoise.probe import probe
 
@@ -23,13 +29,39 @@ def test_the_command_prints_the_figures_of_every_kernel_as_json():
         assert 0 < row["ms"] < 60_000, name
         assert 0 < row["call_ms"] < 60_000, name
         assert 0 <= row["max_error"] < 1e-2, name
+        planes = 4 * 8 * 20 * 12  # the least: eight planes of floats
+        assert planes < row["peak_mb"] * 2**20 < 1e6, name
+        assert row["bytes_a_pixel"] == pytest.approx(row["peak_mb"] * 2**20 / (20 * 12))
+        assert found["threads"] < 2 or row["speed_up"] > 0
         if found["oidn_fast_ms"] is not None:
             assert row["share_of_oidn_fast"] == pytest.approx(row["ms"] / found["oidn_fast_ms"])
 
 
+def test_scaling_has_every_kernel_at_every_size():
+    result = scaling(1, sizes=[(6, 9), (12, 5)])
+    assert result.sizes == ["9x6", "5x12"]
+    assert set(KERNELS) <= set(result.ms)
+    assert all(len(ms) == 2 and min(ms) > 0 for ms in result.ms.values())
+    out = io.StringIO()
+    print_scaling(Scaling(["10x10", "20x10"], 1, {"atrous": [0.5, 1.25]}),
+                  Console(file=out, width=80))
+    assert "5000.0" in out.getvalue()  # ns a pixel: 0.5 ms over 100
+    assert "6250.0" in out.getvalue()
+
+
+def test_measuring_with_one_thread_leaves_the_number_of_threads():
+    seen = []
+    run: Any = SimpleNamespace(one_thread_ms=seen,
+                               measure_kernel=lambda i: float(dr.thread_count()))
+    before = dr.thread_count()
+    measure_one_thread([run], 0)
+    assert seen == ([1.0] if before > 1 else [])
+    assert dr.thread_count() == before
+
+
 @pytest.mark.parametrize("name", KERNELS)
 def test_every_kernel_is_near_its_formula_on_the_probe(name):
-    assert 0 < max_error(name) < 2e-3
+    assert 0 < max_error(name) < 1e-4
 
 
 def test_the_probe_has_surfaces_background_and_motion():

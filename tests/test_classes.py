@@ -68,6 +68,22 @@ def test_a_light_that_dims_in_one_half_is_a_change_of_light_there():
     assert not (found[:, W // 2 + 2:] == "light").any()
 
 
+def test_reflections_are_apart_from_motion_light_and_edges_and_need_a_history():
+    before, now = plain(), plain(index=1, board=translation(1.0, 0, 0))
+    mirror = [with_images(f, roughness=np.full((H, W), 0.25)) for f in (before, now)]
+    found, without = classified(*mirror, 1.0, 0.8), classified(before, now, 1.0, 0.8)
+    assert set(found.ravel()) == {"background", "disoccluded", "glossy"}
+    for name in ("background", "disoccluded"):
+        np.testing.assert_array_equal(found == name, without == name)
+    assert {"moving", "light"} <= set(without.ravel())
+    assert "glossy" not in without
+
+
+def test_a_dull_lobe_is_not_glossy():
+    rough = [with_images(plain(index=i), roughness=np.full((H, W), 0.26)) for i in range(2)]
+    assert "glossy" not in classified(*rough)
+
+
 @pytest.mark.parametrize("change", [0.97, 1.03])
 def test_a_change_below_5_percent_is_none(change):
     assert not (classified(plain(), plain(index=1), 1.0, change) == "light").any()

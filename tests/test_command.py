@@ -57,13 +57,13 @@ def test_a_scene_file_goes_all_the_way_to_a_score(call, scene_file, tmp_path):
     out = tmp_path / "a folder with spaces ü"
     code, text, error = call("run", scene_file, "--out", out, "--reference-spp", 16)
     assert code == 0, error
-    assert "assignment" in text
+    assert "onespp" in text
     scores = json.loads((out / "scores.json").read_text())
     assert scores["frames"] == [0, 1, 2]
     assert scores["reference_spp"] == 16
-    assert set(scores["methods"]) == {"input", "assignment"}
+    assert set(scores["methods"]) == {"input", "onespp"}
     for name in ("scores.csv", "pictures/sheet_0000.png", "pictures/sequence.mp4",
-                 "denoised/assignment/0002.exr", "reference/0002.exr", "frames/0002.json"):
+                 "denoised/onespp/0002.exr", "reference/0002.exr", "frames/0002.json"):
         assert (out / name).stat().st_size > 0, name
 
     code, text, _ = call("score", out, "--json", "-", "--no-pictures")
@@ -98,7 +98,7 @@ def test_a_sequence_without_reference_reports_all_but_the_error(call, scene_file
     call("denoise", out)
     code, _, _ = call("score", out)
     assert code == 0
-    method = json.loads((out / "scores.json").read_text())["methods"]["assignment"]
+    method = json.loads((out / "scores.json").read_text())["methods"]["onespp"]
     assert method["psnr_srgb"] is None
     assert method["ms_per_frame"] > 0
 

@@ -98,7 +98,8 @@ def test_a_score_takes_the_times_measured_in_turns_for_the_same_settings(tmp_pat
     assert sleeper.megapixels_per_s == pytest.approx(HEIGHT * WIDTH / sleeper.ms_per_frame / 1e3)
     assert not other.interleaved  # it ran with another parameter
     assert other.ms_per_frame == sequence.read_run("other").ms[1]
-    assert any("Times of sleeper were measured in turns" in note for note in scores.notes)
+    assert any("Times of sleeper were measured in turns" in note and "medians of their own runs"
+               in note for note in scores.notes)
 
 
 def test_a_run_that_is_not_known_costs_nothing_known(tmp_path):

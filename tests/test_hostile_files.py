@@ -71,6 +71,31 @@ def test_a_channel_of_an_unknown_type_is_named(exr):
     assert r"channel '\n' of an unknown type" in sentence(read_exr, exr)
 
 
+def test_what_a_header_lists_twice_is_named(exr):
+    data = exr.read_bytes()
+    exr.write_bytes(data.replace(b"G\0\2\0\0\0", b"R\0\2\0\0\0"))
+    assert "has two channels 'R'" in sentence(read_exr, exr)
+    at = data.index(b"dataWindow\0")
+    window = data[at:at + len(b"dataWindow\0box2i\0") + 20]
+    exr.write_bytes(data[:at] + window + data[at:])
+    assert "has two 'dataWindow'" in sentence(read_exr, exr)
+
+
+def test_an_image_of_the_other_byte_order_is_no_exr(exr):
+    data = exr.read_bytes()
+    exr.write_bytes(data[3::-1] + data[7:3:-1] + data[8:])
+    assert "is not an OpenEXR file" in sentence(read_exr, exr)
+
+
+def test_more_channels_than_were_asked_for_do_no_harm(tmp_path):
+    sequence = small_sequence(tmp_path)
+    path = tmp_path / "frames/0000.exr"
+    planes = dict(read_exr(path)[0])
+    before = sequence.read_frame(0)["color"]
+    write_exr(path, planes | {"extra.\u00fc": planes["Z"], "..": planes["Z"]})
+    assert (sequence.read_frame(0)["color"] == before).all()
+
+
 def test_an_image_that_was_not_finished_is_noticed(exr):
     """A writer that died leaves a chunk table of zeros."""
     data = exr.read_bytes()
@@ -304,6 +329,8 @@ def test_a_damaged_partial_reference_is_named(tmp_path):
     for spoiled in (b"", b"text", data[:len(data) // 2], data[:100] + b"!" * 50 + data[150:]):
         path.write_bytes(spoiled)
         assert "delete it" in sentence(sequence.read_partial, 0)
+    np.savez_compressed(path, total=np.zeros((5, 5)))  # a few bytes might hold gigabytes
+    assert "delete it" in sentence(sequence.read_partial, 0)
     np.savez(path, total=np.array([{}], dtype=object))  # would run code if it were unpickled
     assert "delete it" in sentence(sequence.read_partial, 0)
 

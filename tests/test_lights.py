@@ -42,7 +42,8 @@ def test_resampling_lowers_the_variance_of_direct_light(name, gain):
     assert variance["mis"] > gain * variance["resampled"]
 
 
-def test_z_order_samples_put_the_error_at_high_frequencies():
+@pytest.mark.parametrize("sampler", ["zsobol", "bluenoise"])
+def test_blue_noise_samplers_put_the_error_at_high_frequencies(sampler):
     """Over the frames of many seeds, blocks of 4x4 pixels average to less error than with PCG."""
     def error(sampler: str, size: int) -> float:
         renderer = Renderer(small_scene(), 32, 32, sampler=sampler)
@@ -52,8 +53,8 @@ def test_z_order_samples_put_the_error_at_high_frequencies():
         assert floor.sum() > 5
         return np.var([blocks(f, size) for f in frames], axis=0)[floor[..., 0]].mean()
 
-    assert error("zsobol", 1) == pytest.approx(error("pcg", 1), rel=0.1)
-    assert error("zsobol", 4) < 0.5 * error("pcg", 4)
+    assert error(sampler, 1) == pytest.approx(error("pcg", 1), rel=0.1)
+    assert error(sampler, 4) < 0.5 * error("pcg", 4)
 
 
 def test_other_frames_and_seeds_are_scrambled_anew():

@@ -13,7 +13,9 @@ from render.frame import Frame
 # Small windows keep these quick; the formulas are tested with the defaults elsewhere.
 SMALL = {"bilateral": {"radius": "4"}, "bilateral-separable": {"radius": "4"},
          "assignment": {"radius": "4"}, "atrous": {"levels": "3"},
-         "assignment-atrous": {"levels": "3"}, "temporal": {}}
+         "assignment-atrous": {"levels": "3"}, "temporal": {}, "svgf": {"levels": "3"},
+         "asvgf": {"levels": "3"},
+         "onespp": {"smoothing": "3", "levels": "3", "sharp_levels": "2"}}
 
 each_method = pytest.mark.parametrize("name", METHODS)
 SIZES = [(1, 1), (1, 7), (7, 1), (3, 5), (13, 17), (23, 2)]
@@ -60,7 +62,8 @@ def test_a_constant_image_stays_constant_at_any_size(name, height, width):
 @each_method
 def test_every_result_lies_between_the_extremes_around_it(name):
     frames = [noisy(make_frame(17, 21, index=i), seed=i) for i in range(3)]
-    reach = 40 if name.startswith("assignment") else 14  # history may bring any earlier frame's
+    # History may bring any earlier frame's.
+    reach = 40 if name.startswith(("assignment", "svgf", "asvgf")) else 14
     joined = np.stack([f["color"] for f in frames])
     low, high = local_extremes(joined.min(0), reach)[0], local_extremes(joined.max(0), reach)[1]
     result = run(name, *frames, **plain(name))
@@ -136,7 +139,8 @@ def test_a_still_scene_has_less_noise_in_its_result(name):
     assert np.mean((result - clean["color"])**2) < 0.7 * before
 
 
-@pytest.mark.parametrize("name", ["temporal", "assignment", "assignment-atrous"])
+@pytest.mark.parametrize("name", ["temporal", "assignment", "assignment-atrous", "svgf",
+                                  "asvgf"])
 def test_history_makes_a_still_scene_flicker_less(name):
     clean = make_frame(24, 24, wall_end=1e9)
     method = build(name, SMALL[name])

@@ -15,6 +15,7 @@ from denoise.metrics import (
     METRICS,
     PSNR_CAP,
     decibels,
+    energy_error,
     measure,
     mse,
     non_finite,
@@ -343,3 +344,9 @@ def test_every_metric_says_what_it_is():
         assert metric.label
         assert f"{1.0:{metric.format}}"
     assert HEADLINE.name in METRICS
+
+
+def test_energy_error_is_the_difference_of_the_means():
+    reference = np.full((3, 4, 3), 2.0, np.float32)
+    assert energy_error(reference * [0.9, 1.0, 1.3], reference) == pytest.approx(0.2 / 3, rel=1e-6)
+    assert energy_error(reference, 0 * reference) is None

@@ -51,7 +51,8 @@ def test_samples_have_the_mean_of_mitsubas_path(name):
 
 @pytest.mark.parametrize(("name", "direct", "sampler"), [
     ("box", "mis", "pcg"), ("box", "mis", "zsobol"), ("box", "resampled", "pcg"),
-    ("room", "mis", "pcg"), ("room", "resampled", "zsobol"), ("furnace", "resampled", "zsobol")])
+    ("room", "mis", "pcg"), ("room", "resampled", "zsobol"), ("furnace", "resampled", "zsobol"),
+    ("box", "mis", "bluenoise"), ("room", "resampled", "bluenoise")])
 def test_frames_at_one_sample_have_the_mean_of_the_reference(name, direct, sampler):
     height, width, frame = 16, 20, 3
     scene = furnace(ALBEDO, EMISSION, DEPTH) if name == "furnace" else catalog.load(name)

@@ -281,3 +281,23 @@ def test_a_plot_of_one_method_and_of_many_shows_a_point_each(tmp_path, drawn, co
     for i in range(10):
         colour = tuple(round(255 * c) for c in colormaps["tab10"].colors[i])
         assert (colour in seen) == (i < count)
+
+
+def test_points_of_times_not_measured_in_turns_are_hollow(tmp_path, drawn):
+    base = drawn[1].methods["fine"]
+
+    def hollow(*in_turns: bool) -> list[bool]:
+        """Whether the middle of each method's point is white."""
+        methods = {f"method-{i}": base.model_copy(update={
+            "ms_per_frame": 10.0 * 4**i, "interleaved": turn}) for i, turn in enumerate(in_turns)}
+        scores = drawn[1].model_copy(update={"methods": methods})
+        plot_speed_against_error(scores, tmp_path / "plot.png")
+        with Image.open(tmp_path / "plot.png") as image:
+            picture = np.asarray(image.convert("RGB"))
+        points = (np.argwhere((picture == np.round(255 * np.array(c))).all(-1))
+                  for c in colormaps["tab10"].colors[:len(in_turns)])
+        middles = ((at.min(axis=0) + at.max(axis=0)) // 2 for at in points)
+        return [bool((picture[y, x] > 250).all()) for y, x in middles]
+
+    assert hollow(False, False) == hollow(True, True) == [False, False]
+    assert hollow(True, False) == [False, True]

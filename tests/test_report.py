@@ -5,23 +5,20 @@ from __future__ import annotations
 import base64
 import json
 import re
-import shlex
 import zlib
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from report_sequence import CHANNELS, COUNT, HEIGHT, METHODS, WIDTH, make_report_sequence
+from report_sequence import CHANNELS, COUNT, METHODS, make_report_sequence
 from small_sequence import contents
 
 import onespp
 from denoise.packed import GUIDE, RADIANCE, WHOLE, pack
 from denoise.pictures import display_error
-from denoise.provenance import commands, method_of
-from denoise.report import EDGES, write_report
+from denoise.report import EDGES, render_page, write_report
 from denoise.score import score
 from render.errors import InputError
-from render.manifest import Run
 from render.sequence import Sequence
 
 
@@ -98,7 +95,6 @@ def test_the_folder_has_one_file_an_image(reported):
     sequence, _, page = reported
     files = {p.relative_to(page.parent).as_posix() for p in page.parent.rglob("*") if p.is_file()}
     kinds = [*(f"frame/{c}" for c in CHANNELS), "reference", *(f"denoised/{m}" for m in METHODS)]
-    kinds += [f"flip/{m}" for m in ("input", *METHODS)] if page_data(page)["flipFrames"] else []
     assert files == {"index.html", "scores.json", "scores.csv",
                      *(f"data/{kind}/{i:04d}.js" for kind in kinds for i in range(COUNT))}
     for kind in ("denoised/rough", "frame/id"):
@@ -194,31 +190,25 @@ def test_names_from_files_cannot_become_markup(tmp_path):
     assert text.count("</script>") == 2
 
 
-def test_command_lines_hold_the_settings_and_survive_a_shell(reported):
-    sequence, _, _ = reported
-    runs = {"atrous-wide": Run(method="atrous-wide", parameters={
-        "levels": 3, "sigma_luminance": 8.0, "sigma_plane": 0.01, "normal_power": 64.0,
-        "demodulate": True}), "theirs": Run(method="theirs", parameters={
-            "external": "run 'a b' {input}", "timing": "whole program"})}
-    render, denoise, external, *rest = map(shlex.split, commands(sequence, runs))
-    assert render[:3] == ["onespp", "render", "made"]
-    assert render[render.index("--size") + 1] == f"{WIDTH}x{HEIGHT}"
-    assert render[render.index("--frames") + 1] == "0:4"
-    assert render[render.index("--seed") + 1] == "7"
-    assert render[render.index("--reference-spp") + 1] == "256"
-    assert denoise[denoise.index("--name") + 1] == "atrous-wide"
-    assert "sigma_luminance=8.0" in denoise
-    assert external[3:] == ["--external", "run 'a b' {input}", "--name", "theirs"]
-    assert [line[1] for line in rest] == ["score", "report"]
+def test_times_measured_in_turns_are_told_apart(reported):
+    sequence, scores, _ = reported
+    def said(*in_turns: str) -> tuple[str, list[bool]]:
+        methods = {name: method.model_copy(update={"interleaved": name in in_turns})
+                   for name, method in scores.methods.items()}
+        data = page_data(write_report(sequence, scores.model_copy(update={"methods": methods}), []))
+        return data["timesAre"], [m["inTurns"] for m in data["methods"]]
+
+    assert said() == ("medians after the first, of each method's own run", [False] * 3)
+    assert said("rough", "fine") == ("medians of times measured in turns", [False, True, True])
+    assert said("fine") == ("measured in turns (filled) or medians of their own runs (hollow)",
+                            [False, False, True])
 
 
-def test_a_run_under_a_name_of_its_own_is_known_by_its_parameters():
-    from denoise.methods import build, parameters
-
-    for name, method in (("mine", "atrous"), ("bilateral-wide", "bilateral")):
-        run = Run(method=name, parameters=parameters(build(method)))
-        assert method_of(name, run) == method
-    assert method_of("mine", Run(method="mine", parameters={"nothing": 1})) == "mine"
+def test_the_page_says_where_glossy_pixels_cannot_be_told(reported, tmp_path):
+    assert "no pixel counts as glossy" in reported[2].read_text()
+    sequence = Sequence(reported[0].folder, reported[0].manifest.model_copy(
+        update={"channels": (*CHANNELS, "roughness")}))
+    assert "no pixel counts as glossy" not in render_page(sequence, reported[1], {})
 
 
 # What is missing or wrong
@@ -237,17 +227,6 @@ def test_an_unknown_channel_is_refused_by_name(reported):
     sequence, scores, _ = reported
     with pytest.raises(InputError, match="lacks the channel 'glow'"):
         write_report(sequence, scores, ["glow"])
-
-
-def test_command_lines_name_the_estimator_and_sampler_that_are_not_the_default(reported):
-    sequence, _, _ = reported
-    plain = commands(sequence, {})[0]
-    assert "--direct" not in plain
-    assert "--sampler" not in plain
-    manifest = sequence.manifest.model_copy(update={"direct": "resampled", "sampler": "zsobol"})
-    other = commands(Sequence(sequence.folder, manifest), {})[0]
-    assert "--direct resampled" in other
-    assert "--sampler zsobol" in other
 
 
 def test_the_command_scores_first_where_there_are_no_scores(tmp_path):

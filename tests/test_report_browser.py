@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from report_sequence import COUNT, HEIGHT, METHODS, WIDTH, make_report_sequence
 
+from denoise.flip import flip_map
+from denoise.metrics import pair
 from denoise.report import write_report
 from denoise.score import score
 from denoise.tonemap import bytes_from_linear
@@ -18,6 +20,7 @@ playwright = pytest.importorskip(
     "playwright.sync_api", reason="playwright is not installed: pip install -e '.[dev]'")
 
 READY = '#stage[data-ready="true"]'
+PATIENCE = 120_000  # ms; a slow machine is not a failure
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +53,7 @@ def opened(browser, report):
         context = browser.new_context(viewport={"width": width, "height": height},
                                       reduced_motion="reduce", **options)
         contexts.append(context)
+        context.set_default_timeout(PATIENCE)
         page = context.new_page()
         page.on("console", lambda m: m.type == "error" and complaints.append(m.text))
         page.on("pageerror", lambda error: complaints.append(str(error)))
@@ -64,6 +68,12 @@ def opened(browser, report):
     assert complaints == []
 
 
+def new_page(browser):
+    page = browser.new_page(viewport={"width": 1300, "height": 900}, reduced_motion="reduce")
+    page.set_default_timeout(PATIENCE)
+    return page
+
+
 def colour_at(page, x: float, y: float) -> list[int]:
     """R, G, B of the stage's canvas at a fraction of its width and height."""
     return page.evaluate("""([x, y]) => {
@@ -73,8 +83,16 @@ def colour_at(page, x: float, y: float) -> list[int]:
     }""", [x, y])
 
 
-def hash_of(page) -> dict[str, str]:
-    page.wait_for_timeout(350)  # the address follows when hands rest
+def box_of(page, selector: str) -> dict[str, float]:
+    """Where an element is in the window, once it is in view and rests."""
+    page.locator(selector).scroll_into_view_if_needed()
+    return page.locator(selector).bounding_box()
+
+
+def hash_of(page, frame: int) -> dict[str, str]:
+    """The address once it has followed to a frame, which it does when hands rest."""
+    page.wait_for_function(
+        "n => new URLSearchParams(location.hash.slice(1)).get('frame') === String(n)", arg=frame)
     return {k: v[0] for k, v in parse_qs(page.evaluate("location.hash.slice(1)")).items()}
 
 
@@ -98,7 +116,7 @@ def test_a_point_says_its_values_and_chooses_its_method(opened, report):
     point = page.locator('#plot-speed [aria-label^="rough"]')
     point.hover()
     value = f"{report[1].methods['rough']['psnr_srgb']:.2f} dB"
-    assert value in page.locator("#tip").inner_text()
+    page.wait_for_function("v => document.getElementById('tip').innerText.includes(v)", arg=value)
     point.click()
     page.wait_for_selector(READY)
     assert page.locator("#b").input_value() == "rough"
@@ -127,9 +145,9 @@ def test_both_pictures_show_the_pixels_of_their_files(opened, report):
 
 def test_the_slider_moves_by_hand_and_by_key(opened):
     page = opened("#frame=0&a=input&b=fine")
-    stage = page.locator("#stage").bounding_box()
+    stage = box_of(page, "#stage")
     middle = colour_at(page, 0.4, 0.5)
-    handle = page.locator("#handle").bounding_box()
+    handle = box_of(page, "#handle")
     page.mouse.move(handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2)
     page.mouse.down()
     page.mouse.move(stage["x"] + 0.2 * stage["width"], stage["y"] + 0.5 * stage["height"])
@@ -163,9 +181,6 @@ def test_frame_and_method_change_by_menu_and_key(opened, report):
                                      "id"])
 def test_every_channel_is_shown(opened, channel):
     page = opened("#frame=1&a=rough&b=rough")
-    if channel not in page.locator("#ca option").evaluate_all("all => all.map(o => o.value)"):
-        assert channel == "flip"
-        pytest.skip("flip-evaluator is not installed, so there are no FLIP maps")
     before = colour_at(page, 0.4, 0.5)
     page.select_option("#ca", channel)
     page.wait_for_selector(READY)
@@ -176,7 +191,7 @@ def test_every_channel_is_shown(opened, channel):
 
 def test_the_pixel_under_the_pointer_is_read_out(opened, report):
     page = opened("#frame=1&a=fine&b=reference&mode=side&zoom=8&x=24&y=16")
-    stage = page.locator("#stage").bounding_box()
+    stage = box_of(page, "#stage")
     x, y = 22, 13
     page.mouse.move(stage["x"] + stage["width"] / 4 + 8 * (x + 0.5 - 24),
                     stage["y"] + stage["height"] / 2 + 8 * (y + 0.5 - 16))
@@ -206,7 +221,7 @@ def test_a_link_restores_the_view(opened):
     assert page.locator("#handle").get_attribute("aria-valuenow") == "30"
     page.locator("#next").click()
     page.wait_for_selector('#stage[data-ready="true"][data-frame="3"]')
-    assert hash_of(page) == {**wanted, "frame": "3"}
+    assert hash_of(page, 3) == {**wanted, "frame": "3"}
     page.evaluate("location.hash = '#frame=1&a=input&b=fine'")
     page.wait_for_selector('#stage[data-ready="true"][data-frame="1"]')
     assert page.locator("#a").input_value() == "input"
@@ -304,7 +319,7 @@ def test_a_missing_file_is_said_in_its_place(browser, report, tmp_path):
     sequence = make_report_sequence(tmp_path / "made", frames=1)
     page_file = write_report(sequence, score(sequence, pictures=False))
     (page_file.parent / "data/denoised/fine/0000.js").unlink()
-    page = browser.new_page()
+    page = new_page(browser)
     page.goto(page_file.as_uri() + "#frame=0&a=input&b=fine")
     page.wait_for_selector(READY)
     assert "data/denoised/fine/0000.js is missing" in page.locator("#trouble-b").inner_text()
@@ -315,7 +330,7 @@ def test_a_missing_file_is_said_in_its_place(browser, report, tmp_path):
 def test_without_references_it_shows_pictures_and_no_empty_plots(browser, tmp_path):
     sequence = make_report_sequence(tmp_path / "made", frames=1)
     (sequence.folder / "reference/0000.exr").unlink()
-    page, errors = browser.new_page(), []
+    page, errors = new_page(browser), []
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.goto(write_report(sequence, score(sequence, pictures=False)).as_uri())
     page.wait_for_selector(READY)
@@ -329,13 +344,69 @@ def test_without_references_it_shows_pictures_and_no_empty_plots(browser, tmp_pa
 
 
 def test_only_what_is_looked_at_is_loaded(browser, report):
-    page = browser.new_page()
+    page = new_page(browser)
     asked = []
     page.on("request", lambda request: asked.append(request.url.rsplit("/report/", 1)[-1]))
     page.goto(report[2] + "#frame=1&a=input&b=fine")
     page.wait_for_selector(READY)
-    page.wait_for_timeout(200)
+    page.wait_for_function("document.getElementById('pixel').textContent.includes('·')")
+    page.wait_for_function("document.querySelectorAll('#pixels tr').length === 3")
+    page.wait_for_timeout(200)  # for anything more
     images = {url for url in asked if url.startswith("data/")}
     assert images == {f"data/{kind}/0001.js" for kind in (
         "frame/color", "denoised/fine", "frame/id", "reference")}
+    page.close()
+
+
+def test_frames_that_fly_by_are_not_loaded(browser, report):
+    page = new_page(browser)
+    asked = []
+    page.on("request", lambda request: asked.append(request.url.rsplit("/report/", 1)[-1]))
+    page.goto(report[2] + "#frame=0&a=input&b=fine")
+    page.wait_for_selector(READY)
+    page.evaluate("""() => [1, 2, 3].forEach((n) => {
+        const slider = document.getElementById("frame");
+        slider.value = n;
+        slider.dispatchEvent(new Event("input"));
+    })""")
+    page.wait_for_selector('#stage[data-ready="true"][data-frame="3"]')
+    assert "data/denoised/fine/0003.js" in asked
+    assert not any(url.endswith("/0002.js") for url in asked)
+    page.close()
+
+
+@pytest.mark.parametrize("workers", [True, False])
+def test_the_flip_map_is_that_of_the_library(browser, report, workers):
+    pytest.importorskip("flip_evaluator", reason="flip-evaluator is not installed")
+    page = new_page(browser)
+    if not workers:
+        page.add_init_script("delete window.Worker")
+    page.goto(report[2] + "#frame=1&a=rough&b=fine&ca=flip&cb=flip&mode=side")
+    page.wait_for_selector(READY)
+    stage = box_of(page, "#stage")
+    zoom = min(stage["width"] / 2 / WIDTH, stage["height"] / HEIGHT)
+    reference = report[0].read_reference(1).color
+    wanted = flip_map(*pair(report[0].read_result("rough", 1), reference).srgb)
+    for x, y in ((0, 0), (WIDTH - 1, 3), (20, HEIGHT - 1), (24, 16), (11, 9)):
+        page.mouse.move(stage["x"] + stage["width"] / 4 + zoom * (x + 0.5 - WIDTH / 2),
+                        stage["y"] + stage["height"] / 2 + zoom * (y + 0.5 - HEIGHT / 2))
+        page.wait_for_function("at => document.getElementById('pixel').textContent.startsWith(at)",
+                               arg=f"x {x}, y {y}")
+        shown = float(page.locator("#pixels tr:first-child td").first.inner_text())
+        assert shown == pytest.approx(wanted[y, x], abs=0.004)
+    page.close()
+
+
+def test_hollow_points_are_of_times_not_measured_in_turns(browser, report, tmp_path):
+    sequence = make_report_sequence(tmp_path / "made", frames=2)
+    scores = score(sequence, pictures=False)
+    methods = {name: method.model_copy(update={"interleaved": name == "fine"})
+               for name, method in scores.methods.items()}
+    page = new_page(browser)
+    page.goto(write_report(sequence, scores.model_copy(update={"methods": methods})).as_uri())
+    page.wait_for_selector(READY)
+    hollow = page.locator("#plot-speed .marker:has(.hollow)")
+    assert [label.split(":")[0] for label in hollow.evaluate_all(
+        "all => all.map((node) => node.getAttribute('aria-label'))")] == ["rough"]
+    assert "medians of their own runs (hollow)" in page.locator("#times-are").inner_text()
     page.close()

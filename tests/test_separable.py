@@ -19,8 +19,8 @@ def test_agrees_with_the_formula_in_float64(height, width):
 
 
 @pytest.mark.parametrize("parameters", [
-    {"radius": 2}, {"sigma_color": 5.0}, {"sigma_normal": 1.0}, {"sigma_plane": 2.0},
-    {"sigma_coord": 1.5}])
+    {"radius": 2}, {"sigma_color": 5.0}, {"sigma_plane": 2.0}, {"sigma_coord": 1.5},
+    {"sigma_normal": 2.0, "sigma_color": 5.0, "sigma_plane": 5.0}])
 def test_each_parameter_does_what_the_formula_says(parameters):
     frame = noisy(make_frame(17, 19))
     expected = oracles.bilateral_separable(frame, **parameters)

@@ -56,13 +56,14 @@ def test_storing_again_is_seen_by_taps_made_before():
         assert stencil.image(taps.at(0))[2].tolist() == [value] * 4 + [0.0]
 
 
-def test_taps_straight_above_and_below_start_at_a_cache_line():
-    """A vector load across two lines takes twice as long."""
+def test_no_tap_of_a_filter_starts_at_a_cache_line():
+    """Such taps are loaded by another instruction, and another kernel: see `_allocate`."""
     for width, reach in ((5, 3), (512, 32), (720, 16)):
         stencil = stencil_of(3, width, reach)
-        taps = stencil.planes([0.0] * 3).taps([(-reach, 0), (0, 0), (1, 0), (0, 1)])
-        starts = [view.numpy().ctypes.data % 64 for t in range(4) for view in taps.at(t)]
-        assert starts == [0] * 9 + [4] * 3
+        offsets = [(dy, dx) for dy in (-reach, 0, 1) for dx in (-reach, -3, -2, 0, 1, 3, reach)]
+        taps = stencil.planes([0.0] * 3).taps(offsets)
+        starts = {view.numpy().ctypes.data % 64 for t in range(len(taps)) for view in taps.at(t)}
+        assert 0 not in starts
         assert stencil.stride // 16 % 2 == 1  # rows far apart share no set of the cache
 
 
@@ -80,11 +81,13 @@ def test_an_image_goes_to_lanes_and_back(components):
 
 def test_exp2_is_exact_to_8e_5_and_finite_for_any_input():
     stencil = stencil_of(1, 1, 1)
-    x = np.linspace(-125.9, 0, 100_001).astype(np.float32)
+    x = np.linspace(-45, 0, 100_001).astype(np.float32)
     result = exp2(stencil.Float(x)).numpy()
     assert np.abs(result / np.exp2(x.astype(np.float64)) - 1).max() < 8e-5
-    low = exp2(stencil.Float([-127.0, -1e30, float("-inf"), float("nan")])).numpy()
-    assert (low <= 1.2e-38).all()
+    x = np.linspace(-200, -45, 10_001).astype(np.float32)
+    assert np.abs(exp2(stencil.Float(x)).numpy() - np.exp2(x.astype(np.float64))).max() < 1e-17
+    low = exp2(stencil.Float([-63.0, -127.0, -1e30, float("-inf"), float("nan")])).numpy()
+    np.testing.assert_array_equal(low, 0)
 
 
 def methods_on(layout, height, width):

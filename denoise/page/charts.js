@@ -20,7 +20,8 @@ class Charts {
     for (const button of document.querySelectorAll("[data-split]")) {
       button.addEventListener("click", () => { this.split = button.dataset.split; this.drawClasses(); });
     }
-    let width = 0;
+    this.draw();
+    let width = byId("plots").clientWidth;
     new ResizeObserver(() => {
       if (byId("plots").clientWidth !== width) this.draw();
       width = byId("plots").clientWidth;
@@ -40,6 +41,7 @@ class Charts {
   draw() {
     if (!this.metric) return;
     hideTip();
+    byId("times-are").textContent = DATA.timesAre;
     byId("metric-about").textContent = this.metric.about;
     this.drawSpeed();
     this.drawFrames();
@@ -89,9 +91,10 @@ class Charts {
     this.drawFront(size, x, y, metric);
     const at = points.map((m) => ({ x: x(m.ms), y: y(m.values[metric.name]), text: m.name }));
     const labels = placeLabels(at, [PLOT.left + 8, 0, size.width, bottom - 2]);
+    const mixed = DATA.methods.some((m) => m.inTurns);
     points.forEach((m, i) => {
       size.node.append(marker(m, at[i].x, at[i].y, [withUnit(m.values[metric.name], metric),
-        `${formatted(m.ms, ".1f")} ms a frame`], () => this.onMethod(m.name)));
+        `${formatted(m.ms, ".1f")} ms a frame${m.inTurns ? ", in turns" : ""}`], () => this.onMethod(m.name), 6.5, mixed && !m.inTurns));
       const label = labels[i];
       if (label) size.node.append(svg("text", { x: label.x, y: label.y, "text-anchor": label.anchor, class: "name", "aria-hidden": "true" }, m.name));
     });

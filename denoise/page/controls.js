@@ -32,7 +32,7 @@ class Controls {
   moved() {
     this.viewer.touched = true;
     this.viewer.draw();
-    this.viewer.showPixel();
+    this.viewer.readout.showPixel();
   }
 
   menus() {
@@ -185,7 +185,7 @@ class Controls {
     const { viewer } = this;
     const [x, y] = imageFromStage(viewer.state, ...viewer.size, left, top).map(Math.floor);
     viewer.pixel = x >= 0 && y >= 0 && x < DATA.width && y < DATA.height ? [x, y] : null;
-    if (viewer.pixel) viewer.showPixel();
+    if (viewer.pixel) viewer.readout.showPixel();
     viewer.draw();
   }
 

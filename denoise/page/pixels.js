@@ -2,18 +2,7 @@
 
 const CACHE_BYTES = 256 * 2 ** 20;
 
-/** Half float of every 16-bit word. */
-const HALF = (() => {
-  const table = new Float32Array(65536);
-  for (let u = 0; u < 65536; u++) {
-    const exponent = (u >> 10) & 31, mantissa = u & 1023;
-    const size = exponent === 0 ? mantissa * 2 ** -24
-      : exponent === 31 ? (mantissa ? NaN : Infinity)
-      : (1 + mantissa / 1024) * 2 ** (exponent - 15);
-    table[u] = u & 0x8000 ? -size : size;
-  }
-  return table;
-})();
+const HALF = halfFloats();
 
 /** Clipped sRGB of linear radiance; what is not a number is black, as in the scores. */
 function srgb(x) {
@@ -29,7 +18,8 @@ class Images {
     this.kept = new Map();     // key -> image; the oldest use comes first
     this.bytes = 0;
     this.pending = new Map();  // key -> {promise, give}
-    window.onesppImage = (key, head, text) => this.pending.get(key)?.give(decode(head, text));
+    this.crew = new Crew();
+    window.onesppImage = (key, head, text) => this.pending.get(key)?.give(this.crew.work("unpack", head, text));
   }
 
   /** The image if it is here. */
@@ -47,6 +37,7 @@ class Images {
     const image = this.peek(key);
     if (image) return Promise.resolve(image);
     if (this.pending.has(key)) return this.pending.get(key).promise;
+    if (key.startsWith("flip ")) return this.flip(key);
     const script = html("script", { src: `data/${key.split("/").map(encodeURIComponent).join("/")}.js` });
     const promise = new Promise((resolve, reject) => {
       this.pending.set(key, { give: resolve });
@@ -57,6 +48,15 @@ class Images {
     });
     this.pending.get(key).promise = promise;
     document.head.append(script);
+    return promise;
+  }
+
+  /** FLIP of two images: of the key "flip A B", with their keys. */
+  flip(key) {
+    const promise = Promise.all(key.split(" ").slice(1).map((part) => this.load(part)))
+      .then((images) => this.crew.work("flipMap", ...images)).then((map) => this.keep(key, map))
+      .finally(() => this.pending.delete(key));
+    this.pending.set(key, { promise });
     return promise;
   }
 
@@ -72,41 +72,8 @@ class Images {
   }
 }
 
-/** {width, height, planes: [Uint16Array], whole, bytes}; words of half floats, or numbers + 1. */
-async function decode(head, text) {
-  const { width, height, planes, drop, color, whole } = head;
-  const letters = atob(text);
-  const packed = new Uint8Array(letters.length);
-  for (let i = 0; i < letters.length; i++) packed[i] = letters.charCodeAt(i);
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const raw = new Uint8Array(await new Response(stream).arrayBuffer());
-  const size = width * height, low = planes * size;
-  const words = [];
-  for (let c = 0; c < planes; c++) {
-    const plane = new Uint16Array(size);
-    for (let y = 0, i = 0; y < height; y++) {
-      let last = y ? plane[i - width] : 0;
-      for (const end = i + width; i < end; i++) {
-        const at = c * size + i;
-        last = (last + (raw[at] << 8) + raw[low + at]) & 0xffff;
-        plane[i] = last;
-      }
-    }
-    words.push(plane);
-  }
-  if (color) {
-    const [red, green, blue] = words;
-    for (let i = 0; i < size; i++) {
-      red[i] += green[i];
-      blue[i] += green[i];
-    }
-  }
-  if (drop) for (const plane of words) for (let i = 0; i < size; i++) plane[i] <<= drop;
-  return { width, height, planes: words, whole, bytes: 2 * planes * size };
-}
-
 /** Values of a pixel: numbers, one a plane. */
-const valuesAt = (image, i) => image.planes.map((plane) => (image.whole ? plane[i] - 1 : HALF[plane[i]]));
+const valuesAt = (image, i) => image.planes.map((plane) => (image.whole ? plane[i] - 1 : image.float ? plane[i] : HALF[plane[i]]));
 
 /** Mean over R, G, B of |S(a) - S(b)| at a pixel; S is clipped sRGB. */
 function errorAt(a, b, i) {
@@ -159,7 +126,7 @@ function paintError(out, image, reference, exposure) {
 function paintFlip(out, image, exposure) {
   const gain = 255 * 2 ** exposure;
   const [plane] = image.planes;
-  for (let i = 0; i < out.length; i++) out[i] = COLOURS.magma[Math.min(255, Math.round(HALF[plane[i]] * gain))];
+  for (let i = 0; i < out.length; i++) out[i] = COLOURS.magma[Math.min(255, Math.round(plane[i] * gain))];
 }
 
 /** A colour for each object, by the golden ratio around the wheel; nothing there is dark. */

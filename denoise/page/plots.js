@@ -99,7 +99,7 @@ function showTip(x, y, lines) {
 const hideTip = () => (byId("tip").hidden = true);
 
 /** A marker that says its values on hover and on focus. */
-function marker(method, x, y, lines, onclick = null, r = 6.5) {
+function marker(method, x, y, lines, onclick = null, r = 6.5, hollow = false) {
   const say = (left, top) => showTip(left, top, [[swatch(method), html("b", {}, method.name)], ...lines]);
   const press = onclick && ((event) => {
     if (event.type === "click" || event.key === "Enter" || event.key === " ") {
@@ -114,7 +114,8 @@ function marker(method, x, y, lines, onclick = null, r = 6.5) {
     onfocus: (e) => { const r = e.target.getBoundingClientRect(); say(r.right, r.bottom); },
     onblur: hideTip, ...(press ? { onclick: press, onkeydown: press } : {}) },
     svg("circle", { r: 2 * r, fill: "transparent" }),
-    svg("path", { d: markerPath(method, r), fill: colourOf(method), class: "mark" }));
+    svg("path", { d: markerPath(method, r), class: hollow ? "mark hollow" : "mark",
+      [hollow ? "stroke" : "fill"]: colourOf(method) }));
 }
 
 /** Where to write names so that they miss each other: [{x, y, text}] -> [{x, y, anchor}]. */

@@ -1,7 +1,7 @@
 // What the viewer shows: its state, as text in the address, and where pixels are on the screen.
 
 const SOURCES = [...DATA.methods.map((m) => m.name), ...(DATA.hasReference ? ["reference"] : [])];
-const CHANNELS = ["result", ...(DATA.hasReference ? ["error"] : []), ...(DATA.flipFrames.length ? ["flip"] : []),
+const CHANNELS = ["result", ...(DATA.hasReference ? ["error", "flip"] : []),
   ...DATA.channels.map((c) => c.name)];
 const MOST_ZOOM = 64;
 

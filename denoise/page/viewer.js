@@ -13,8 +13,10 @@ class Viewer {
     this.sides = ["a", "b"].map((side) => ({ side, canvas: document.createElement("canvas"), painted: "", trouble: "" }));
     for (const { canvas } of this.sides) [canvas.width, canvas.height] = [DATA.width, DATA.height];
     this.pixel = null;
+    this.readout = new Readout(this);
     this.playing = false;
-    this.turn = 0;
+    this.stale = false;    // what is shown is no longer what is wanted
+    this.showing = null;   // promise of what is shown, while images load
     this.state = stateOfHash(location.hash);
     this.stage.style.setProperty("--aspect", DATA.width / DATA.height);
     new ResizeObserver(() => this.draw()).observe(this.stage);
@@ -44,36 +46,47 @@ class Viewer {
     }
     if (channel === "flip") {
       if (source === "reference") return { source, channel, keys: [], trouble: "the reference has no FLIP to itself" };
-      if (!DATA.flipFrames.includes(frame)) return { source, channel, keys: [], trouble: `FLIP is mapped on frames ${DATA.flipFrames.join(", ")}` };
-      return { source, channel, keys: [`flip/${source}/${String(frame).padStart(4, "0")}`] };
+      if (!DATA.references.includes(frame)) return { source, channel, keys: [], trouble: `frame ${frame} has no reference` };
+      return { source, channel, keys: [`flip ${keyOf(source, frame)} ${keyOf("reference", frame)}`] };
     }
     return { source, channel, keys: [keyOf(source, frame)] };
   }
 
-  async update() {
-    const turn = ++this.turn;
+  /** Shows the state. What is wanted while images load waits, and of that only the latest is loaded. */
+  update() {
     this.stage.dataset.ready = "false";
     this.showControls();
-    const wanted = this.sides.map(({ side }) => this.wanted(side));
+    this.stale = true;
+    this.showing ??= this.show();
+    return this.showing;
+  }
+
+  async show() {
     const slow = setTimeout(() => this.stage.classList.add("loading"), 150);
-    const loaded = await Promise.all(wanted.map(async (want) => {
-      try {
-        return { ...want, images: await Promise.all(want.keys.map((key) => this.images.load(key))) };
-      } catch (error) {
-        return { ...want, trouble: error.message, images: [] };
-      }
-    }));
+    while (this.stale) {
+      this.stale = false;
+      const loaded = await Promise.all(this.sides.map(({ side }) => this.loaded(this.wanted(side))));
+      loaded.forEach((want, i) => this.paint(this.sides[i], want));
+      this.draw();
+    }
     clearTimeout(slow);
-    if (turn !== this.turn) return;  // something newer is wanted
     this.stage.classList.remove("loading");
-    loaded.forEach((want, i) => this.paint(this.sides[i], want));
-    this.draw();
-    this.showNumbers();
-    this.showPixel();
+    this.readout.showNumbers();
+    this.readout.showPixel();
     this.stage.dataset.ready = "true";
     this.stage.dataset.frame = this.state.frame;
+    this.showing = null;
     this.onFrame(this.state.frame);
     this.saveSoon();
+  }
+
+  /** What is wanted with its images, or with why there are none. */
+  async loaded(want) {
+    try {
+      return { ...want, images: await Promise.all(want.keys.map((key) => this.images.load(key))) };
+    } catch (error) {
+      return { ...want, trouble: error.message, images: [] };
+    }
   }
 
   paint(target, want) {
@@ -89,7 +102,7 @@ class Viewer {
     const range = DATA.channels.find((c) => c.name === want.channel)?.range;
     if (want.channel === "error") paintError(out, image, reference, ev);
     else if (want.channel === "flip") paintFlip(out, image, ev);
-    else if (want.channel === "id") paintObjects(out, image);
+    else if (["id", "hit_id"].includes(want.channel)) paintObjects(out, image);
     else if (want.channel === "normal") paintRange(out, image, -1, 1);
     else if (range) paintRange(out, image, range[0], range[1] === range[0] ? range[0] + 1 : range[1]);
     else paintRadiance(out, image, ev);
@@ -149,17 +162,6 @@ class Viewer {
     }, 200);
   }
 
-  // What stands beside the pictures
-
-  title(side) {
-    const [source, channel] = [this.state[side], this.state[`c${side}`]];
-    const metric = METRIC[DATA.headline];
-    const i = DATA.frames.indexOf(this.state.frame);
-    const value = metric && METHOD[source]?.perFrame[metric.name][i];
-    if (DATA.channels.some((c) => c.name === channel)) return channel;
-    return source + (channel === "result" ? "" : ` · ${channel}`) + (value === null || value === undefined ? "" : ` · ${withUnit(value, metric)}`);
-  }
-
   showControls() {
     const { state } = this;
     for (const key of ["a", "b", "ca", "cb"]) byId(key).value = state[key];
@@ -171,63 +173,6 @@ class Viewer {
     byId("handle").setAttribute("aria-valuenow", Math.round(100 * state.split));
     for (const button of document.querySelectorAll("[data-set-mode]")) button.setAttribute("aria-pressed", String(button.dataset.setMode === state.mode));
     byId("play").setAttribute("aria-pressed", String(this.playing));
-  }
-
-  showNumbers() {
-    this.sides.forEach((target) => {
-      const { side, trouble } = target;
-      byId(`tag-${side}`).textContent = `${side.toUpperCase()} · ${this.title(side)}`;
-      byId(`trouble-${side}`).textContent = trouble;
-    });
-    const { a, b, frame } = this.state;
-    this.canvas.setAttribute("aria-label", `Frame ${frame}: ${this.title("a")} against ${this.title("b")}`);
-    if (!this.playing) byId("status").textContent = `Frame ${frame}: A ${this.title("a")}, B ${this.title("b")}`;
-    const i = DATA.frames.indexOf(frame);
-    const value = (source, m) => METHOD[source]?.perFrame[m.name]?.[i] ?? null;
-    const rows = DATA.metrics.filter((m) => value(a, m) !== null || value(b, m) !== null).map((m) => {
-      const values = [value(a, m), value(b, m)];
-      const better = values.includes(null) || values[0] === values[1] ? -1 : (values[0] > values[1]) === m.higherIsBetter ? 0 : 1;
-      return html("tr", {}, html("th", { scope: "row", title: m.about }, m.unit ? `${m.label} (${m.unit})` : m.label),
-        ...values.map((v, k) => html("td", k === better ? { class: "best" } : {}, formatted(v, m.format))));
-    });
-    byId("numbers").replaceChildren(...rows);
-    byId("numbers-of").textContent = `This frame (${frame})`;
-    byId("numbers-a").title = a;
-    byId("numbers-b").title = b;
-    byId("numbers-table").hidden = !rows.length;
-  }
-
-  /** Values of the pixel under the pointer, or of the middle of the stage. */
-  showPixel() {
-    const { state } = this;
-    const [x, y] = (this.pixel ?? [state.x, state.y]).map((v, k) => Math.max(0, Math.min([DATA.width, DATA.height][k] - 1, Math.floor(v))));
-    const i = y * DATA.width + x;
-    const ids = this.glance(DATA.channels.some((c) => c.name === "id") && guideKey("id", state.frame));
-    const reference = this.glance(DATA.references.includes(state.frame) && keyOf("reference", state.frame));
-    const object = ids && (DATA.objects[valuesAt(ids, i)[0]] ?? "background");
-    byId("pixel").textContent = `x ${x}, y ${y}${object ? ` · ${object}` : ""}`;
-    const rows = this.sides.map(({ side }) => {
-      const { source, channel, keys, trouble } = this.wanted(side);
-      const image = !trouble && this.glance(keys[0]);
-      const judged = reference && image && ["result", "error"].includes(channel) && image.planes.length === 3;
-      const name = ["result", "error"].includes(channel) ? source : channel === "flip" ? `FLIP ${source}` : channel;
-      return this.pixelRow(side.toUpperCase(), name, image && valuesAt(image, i), judged ? errorAt(image, reference, i) : null);
-    });
-    if (reference) rows.push(this.pixelRow("", "reference", valuesAt(reference, i), null));
-    byId("pixels").replaceChildren(...rows);
-  }
-
-  pixelRow(side, name, values, error) {
-    const cells = [0, 1, 2].map((k) => html("td", {}, values && k < values.length ? short(values[k]) : ""));
-    return html("tr", {}, html("th", { scope: "row", title: name }, side ? html("b", {}, side) : null, ` ${name}`), ...cells, html("td", {}, error === null ? "" : error.toFixed(3)));
-  }
-
-  /** The image if it is here; if not, and nothing plays, asks for it and reads out again later. */
-  glance(key) {
-    if (!key) return null;
-    const image = this.images.peek(key);
-    if (!image && !this.playing) this.images.load(key).then(() => this.showPixel(), () => {});
-    return image ?? null;
   }
 
   // Playing

@@ -1,0 +1,130 @@
+"""`python -m denoise.ablation DIR...`: what each part of a method is worth, as a Markdown table.
+
+A part is a parameter that is true or false; each row turns one of them to what it is not by
+default. Nothing is written: frames are denoised in memory, all variants side by side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+import click
+
+from render.command import device_option, threads_option, use
+from render.errors import InputError
+from render.sequence import Sequence
+from render.terminal import progress, run
+
+from .ground import read_ground
+from .judge import Judge
+from .methods import Method, build, channels_read, parameters
+from .stability import MEASURES
+from .tonemap import TONE_MAP
+
+COLUMNS = ("psnr_srgb", "flip", "flicker")
+WHOLE = "as it is"
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A method with one part changed: mean of each measure over the frames of a sequence."""
+
+    name: str
+    means: dict[str, float | None]
+
+
+def variants(name: str) -> dict[str, Method]:
+    """What to call it -> method: the method as it is, then with each part turned over.
+
+    Raises:
+        InputError: no such method, or none of its parameters is true or false.
+    """
+    parts = {k: v for k, v in parameters(build(name)).items() if isinstance(v, bool)}
+    if not parts:
+        raise InputError(f"the method '{name}' has no parts to switch off")
+    return {WHOLE: build(name), **{f"{'without' if on else 'with'} {part}":
+                                   build(name, {part: str(not on)}) for part, on in parts.items()}}
+
+
+def ablate(sequence: Sequence, methods: dict[str, Method],
+           on_frame: Callable[[int], None] = lambda done: None) -> list[Variant]:
+    """Denoise and judge the frames that have a reference.
+
+    Raises:
+        InputError: the sequence has no reference, or a frame lacks what a method needs.
+    """
+    frames = [i for i in sequence.frames if sequence.has_frame(i)]
+    if not any(map(sequence.has_reference, frames)):
+        raise InputError(f"{sequence.folder} has no reference to compare with: "
+                         "render one with --reference-spp")
+    judges = {name: Judge() for name in methods}
+    states: dict[str, Any] = {name: m.init(*sequence.size) for name, m in methods.items()}
+    channels = dict.fromkeys(c for m in methods.values()
+                             for c in channels_read(m, sequence.manifest.channels))
+    before, ground = {b: a for a, b in pairwise(sequence.frames)}, None
+    for done, number in enumerate(frames):
+        last = ground if done and frames[done - 1] == before.get(number) else None
+        ground, _ = read_ground(sequence, number, last)
+        frame = sequence.read_frame(number, list(channels))
+        for name, method in methods.items():
+            image, states[name] = method(frame, states[name])
+            judges[name].see(number, before.get(number), image, ground, None, COLUMNS[:2])
+        on_frame(done + 1)
+    return [Variant(name, {c: _mean(row[c] for row in judge.rows) for c in COLUMNS})
+            for name, judge in judges.items()]
+
+
+def _mean(values: Iterator[float | None]) -> float | None:
+    known = [v for v in values if v is not None]
+    return fmean(known) if known else None
+
+
+def markdown(method: str, results: dict[str, list[Variant]]) -> str:
+    """The table; results: title of a sequence -> its variants. Differences are to the first row."""
+    heads = [f"{title} {MEASURES[c].label}" for title in results for c in COLUMNS]
+    lines = ["| " + " | ".join([f"`{method}`", *heads]) + " |",
+             "| " + " | ".join(["---"] * (1 + len(heads))) + " |"]
+    for row in zip(*results.values()):
+        cells = [_cell(c, variant.means[c], rows[0].means[c])
+                 for variant, rows in zip(row, results.values()) for c in COLUMNS]
+        lines.append("| " + " | ".join([row[0].name, *cells]) + " |")
+    return "\n".join(lines)
+
+
+def _cell(column: str, value: float | None, whole: float | None) -> str:
+    if value is None or whole is None:
+        return "-"
+    text = format(value, MEASURES[column].format)
+    return text if column != COLUMNS[0] or value == whole else f"{text} ({value - whole:+.2f})"
+
+
+@click.command()
+@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path),
+                metavar="DIR...")
+@click.option("--method", default="svgf", show_default=True, metavar="NAME")
+@device_option
+@threads_option
+def ablation(folders: tuple[Path, ...], method: str, device: str, threads: int | None) -> None:
+    """Print what each part of a method is worth on the sequences in DIR, as Markdown."""
+    use(device, threads)
+    methods, results, notes = variants(method), {}, []
+    with progress() as begin:
+        for folder in folders:
+            sequence = Sequence.open(folder)
+            steps = begin(f"ablation of {method} on {folder.name}", len(sequence.frames))
+            results[folder.name] = ablate(sequence, methods, steps.advance)
+            m = sequence.manifest
+            notes.append(f"{folder.name}: {m.scene}, {len(m.frames)} frames of "
+                         f"{m.width}x{m.height}, seed {m.seed}, --direct {m.direct} "
+                         f"--sampler {m.sampler}, reference {m.reference_spp} spp")
+    click.echo(markdown(method, results))
+    click.echo("\n" + "; ".join(notes) + f"; means over frames, PSNR on {TONE_MAP}.")
+
+
+if __name__ == "__main__":
+    run(ablation, name="python -m denoise.ablation")

@@ -1,0 +1,178 @@
+"""Every method on hard scenes: what its history gains or costs, and how soon it recovers.
+
+The yardstick of a method is its own history-free form: the same method, told for each frame that
+there was none before. A frame is as good as that one if its PSNR is at most `MARGIN` dB below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from render.errors import InputError
+from render.frame import Frame
+from render.sequence import Sequence as Folder
+
+from .methods import METHODS, Method
+from .metrics import measure_pair, non_finite, pair, reference_floor
+
+MARGIN = 0.3          # dB
+ENERGY_MARGIN = 0.02  # of the reference's mean
+INPUT = "input"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One method on one scene.
+
+    Attributes:
+        psnr, alone: dB of each frame (`metrics.HEADLINE`), as it is and history-free.
+        event: index of the frame at which everything changes at once, or None.
+        energy: mean of its output over mean of the reference, all frames together.
+        bad_pixels: non-finite ones, all frames together.
+        diffuse: whether the scene has nothing but diffuse surfaces.
+        floor: dB that a perfect image would get against this noisy reference.
+    """
+
+    scene: str
+    method: str
+    psnr: tuple[float, ...]
+    alone: tuple[float, ...]
+    event: int | None
+    energy: float
+    bad_pixels: int
+    diffuse: bool
+    floor: float
+
+    @property
+    def gain(self) -> float:
+        """dB over the history-free form, mean over frames."""
+        return float(np.mean(self.psnr) - np.mean(self.alone))
+
+    @property
+    def worst(self) -> float:
+        """The least of the gains of the frames."""
+        return float(np.min(np.subtract(self.psnr, self.alone)))
+
+    @property
+    def recovery(self) -> int | None:
+        """Frames after the event until it is as good as history-free for good; 0: at once."""
+        if self.event is None:
+            return None
+        lost = np.flatnonzero(np.subtract(self.psnr, self.alone)[self.event:] < -MARGIN)
+        return int(lost[-1]) + 1 if lost.size else 0
+
+    @property
+    def recovered(self) -> bool:
+        """Whether it was as good again before the scene ended."""
+        return self.event is None or (self.recovery or 0) < len(self.psnr) - self.event
+
+
+def judge(folder: Folder, scene: str, event: int | None, diffuse: bool,
+          after_method: Callable[[], None] = lambda: None) -> list[Row]:
+    """Rows of the input and of every method of `METHODS` for a rendered sequence.
+
+    Raises:
+        InputError: a frame or a reference is missing, or a channel that a method needs.
+    """
+    missing = [i for i in folder.frames if not (folder.has_frame(i) and folder.has_reference(i))]
+    if missing:
+        raise InputError(f"{folder.folder} lacks frame or reference {missing[0]}: render them with "
+                         "--reference-spp")
+    frames = [folder.read_frame(i) for i in folder.frames]
+    truth = [folder.read_reference(i) for i in folder.frames]
+    colors = [t.color for t in truth]
+    floor = float(np.mean([reference_floor(t.color, t.variance) for t in truth]))
+    rows = []
+    for name in (INPUT, *METHODS):
+        images, alone = _denoised(name, frames)
+        psnr, yardstick = _decibels(images, colors), _decibels(alone, colors)
+        energy = float(np.mean(images, dtype=np.float64) / np.mean(colors, dtype=np.float64))
+        bad = sum(int(non_finite(image).sum()) for image in images)
+        rows.append(Row(scene, name, psnr, yardstick, event, energy, bad, diffuse, floor))
+        after_method()
+    return rows
+
+
+def _denoised(name: str, frames: Sequence[Frame]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Images of a method with its history, and without."""
+    if name == INPUT:
+        images = [frame["color"] for frame in frames]
+        return images, images
+    method: Method = METHODS[name]()
+    size = frames[0].height, frames[0].width
+    return run(method, frames, method.init(*size)), run_alone(method, frames, method.init(*size))
+
+
+def run(method: Method, frames: Iterable[Frame], state: object) -> list[np.ndarray]:
+    """A method's images of one frame after another."""
+    images = []
+    for frame in frames:
+        image, state = method(frame, state)
+        images.append(image)
+    return images
+
+
+def run_alone(method: Method, frames: Iterable[Frame], state: object) -> list[np.ndarray]:
+    """A method's images of frames that each come first; `state` is one before any frame."""
+    return [method(frame, state)[0] for frame in frames]
+
+
+def _decibels(images: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> tuple[float, ...]:
+    values = (measure_pair(pair(a, b), ("psnr_srgb",))["psnr_srgb"] for a, b in zip(images, truth))
+    return tuple(float(value) for value in values if value is not None)
+
+
+def misses(rows: Iterable[Row]) -> dict[str, list[str]]:
+    """Method and promise -> the scenes on which it is broken, each with its number."""
+    found: dict[str, list[str]] = {}
+    for row in rows:
+        off = row.diffuse and row.method != INPUT and abs(row.energy - 1) > ENERGY_MARGIN
+        for broken, promise, number in (
+                (row.bad_pixels, "pixels that are not finite", f"{row.bad_pixels}"),
+                (row.gain < -MARGIN, f"more than {MARGIN} dB worse than its history-free form",
+                 f"{row.gain:+.1f}"),
+                (not row.recovered, "not recovered from a change when the scene ends",
+                 f"{row.recovery} frames"),
+                (off, f"energy off by more than {ENERGY_MARGIN:.0%} where all is diffuse"
+                 .replace("%", " %"), f"{row.energy:.3f}")):
+            if broken:
+                found.setdefault(f"{row.method}: {promise}", []).append(f"{row.scene} ({number})")
+    return found
+
+
+def markdown(rows: Sequence[Row]) -> str:
+    """Tables of scenes (rows) by methods (columns), and a list of the misses."""
+    parts = []
+    for title, cell, wanted in (
+            ("PSNR, dB (mean over frames)", lambda r: f"{np.mean(r.psnr):.2f}", rows),
+            ("Gain over its own history-free form, dB: mean (worst frame)", _gain, rows),
+            ("Frames to recover after a change", _recovery,
+             [r for r in rows if r.event is not None]),
+            ("Energy: mean of the output over mean of the reference", lambda r: f"{r.energy:.3f}",
+             rows)):
+        parts.append(_table(title, wanted, cell))
+    broken = misses(rows)
+    parts.append("\n".join(f"- {promise}: {', '.join(scenes)}"
+                           for promise, scenes in sorted(broken.items())) or "Nothing is missed.")
+    return "\n\n".join(parts)
+
+
+def _gain(row: Row) -> str:
+    return "" if row.psnr == row.alone else f"{row.gain:+.1f} ({row.worst:+.1f})"
+
+
+def _recovery(row: Row) -> str:
+    return "" if row.psnr == row.alone else f"{'' if row.recovered else '> '}{row.recovery}"
+
+
+def _table(title: str, rows: Sequence[Row], cell: Callable[[Row], str]) -> str:
+    cells = {(row.scene, row.method): cell(row) for row in rows}
+    scenes = list(dict.fromkeys(row.scene for row in rows))
+    methods = [m for m in dict.fromkeys(row.method for row in rows)
+               if any(cells[scene, m] for scene in scenes)]
+    lines = [f"| {title} | {' | '.join(methods)} |", "| --- |" + " --- |" * len(methods)]
+    lines += [f"| {s} | {' | '.join(cells[s, m] for m in methods)} |" for s in scenes]
+    return "\n".join(lines)

@@ -1,0 +1,122 @@
+"""`python -m denoise.lead PLAIN OURS ...`: how far a method is ahead of a peer, as Markdown.
+
+For each scene two scored folders: frames of the plain estimator, which any renderer gives, and of
+ours; the peer gets both inputs, the method the second. Everything is read from their scores.json.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from render.errors import InputError
+from render.terminal import run
+
+from .scorecard import MethodScore, Scores, read_scores
+
+CAUSES = ("glossy", "disoccluded", "light")
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A method and a peer on one scene; `plain` is the peer on the plain input."""
+
+    method: MethodScore
+    peer: MethodScore
+    plain: MethodScore
+
+
+def _psnr(score: MethodScore, frame: int | None = None) -> float:
+    value = score["psnr_srgb"] if frame is None else score.per_frame[frame]["psnr_srgb"]
+    if value is None:
+        raise InputError("the scores hold no PSNR: score a sequence that has a reference")
+    return value
+
+
+def _worst(pair: Pair) -> float | None:
+    leads = [_psnr(pair.method, i) - _psnr(pair.peer, i)
+             for i in range(1, len(pair.method.per_frame))]
+    return min(leads, default=None)
+
+
+def _ratio(measure: str) -> Callable[[Pair], float | None]:
+    def ratio(pair: Pair) -> float | None:
+        a, b = pair.method[measure], pair.peer[measure]
+        return a / b if a is not None and b else None
+    return ratio
+
+
+def _class_lead(cause: str) -> Callable[[Pair], float | None]:
+    def lead(pair: Pair) -> float | None:
+        scores = [m.by_cause.get(cause) for m in (pair.method, pair.peer)]
+        a, b = (s.psnr_srgb if s else None for s in scores)
+        return a - b if a is not None and b is not None else None
+    return lead
+
+
+ROWS: dict[str, tuple[Callable[[Pair], float | None], str]] = {
+    "mean PSNR over the peer on plain input, dB": (
+        lambda p: _psnr(p.method) - _psnr(p.plain), "+.2f"),
+    "mean PSNR over the peer on our input, dB": (
+        lambda p: _psnr(p.method) - _psnr(p.peer), "+.2f"),
+    "the same, worst frame after the first, dB": (_worst, "+.2f"),
+    "the same, first frame, dB": (lambda p: _psnr(p.method, 0) - _psnr(p.peer, 0), "+.2f"),
+    "FLIP, share of the peer's": (_ratio("flip"), ".2f"),
+    "flicker, share of the peer's": (_ratio("flicker"), ".2f"),
+    **{f"PSNR over the peer on {cause} pixels, dB": (_class_lead(cause), "+.2f")
+       for cause in CAUSES},
+    "energy off by": (lambda p: p.method["energy_error"], ".2%"),
+}
+
+
+def markdown(method: str, peer: str, scenes: dict[str, tuple[Scores, Scores]]) -> str:
+    """The table; scenes: name -> scores of plain and of our input.
+
+    Raises:
+        InputError: a folder's scores lack the method or the peer.
+    """
+    pairs = {}
+    for name, (plain, ours) in scenes.items():
+        for scores, wanted in ((plain, (peer,)), (ours, (method, peer))):
+            for key in wanted:
+                if key not in scores.methods:
+                    raise InputError(f"the scores of {name} lack '{key}': denoise by it and score")
+        pairs[name] = Pair(ours.methods[method], ours.methods[peer], plain.methods[peer])
+    lines = [f"| `{method}` and `{peer}` | " + " | ".join(pairs) + " |",
+             "| --- |" + " --- |" * len(pairs)]
+    for row, (measure, form) in ROWS.items():
+        values = [measure(pair) for pair in pairs.values()]
+        cells = ["-" if v is None else format(v, form) for v in values]
+        lines.append(f"| {row} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+@click.command()
+@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path),
+                metavar="PLAIN OURS [PLAIN OURS]...")
+@click.option("--method", default="onespp", show_default=True, metavar="NAME")
+@click.option("--peer", default="oidn-high", show_default=True, metavar="NAME")
+def lead(folders: tuple[Path, ...], method: str, peer: str) -> None:
+    """Print how far a method is ahead of a peer, from the scores of pairs of folders."""
+    if len(folders) % 2:
+        raise InputError("folders come in pairs, of plain input and of ours: give one more")
+    read = [read_scores(folder / "scores.json") for folder in folders]
+    scenes = {folder.name: (a, b) for folder, a, b in zip(folders[1::2], read[::2], read[1::2])}
+    click.echo(markdown(method, peer, scenes))
+    for name, (plain, ours) in scenes.items():
+        floor = ours.reference_floor_db
+        click.echo(f"\n{name}: {len(ours.frames)} frames of {ours.size[0]}x{ours.size[1]}, "
+                   f"reference {ours.reference_spp} spp, floor "
+                   + (f"{floor:.1f} dB" if floor is not None else "not known")
+                   + "".join(f"; {key} {_psnr(s.methods[key]):.2f} dB{where}"
+                             for s, key, where in ((plain, "input", " (plain)"),
+                                                   (plain, peer, " (plain)"), (ours, "input", ""),
+                                                   (ours, peer, ""), (ours, method, ""))), nl=False)
+    click.echo()
+
+
+if __name__ == "__main__":
+    run(lead, name="python -m denoise.lead")

@@ -1,0 +1,201 @@
+"""Outlier removal before the filter: a stage that any method can follow.
+
+Symbols: C a signal without texture, one channel; mu, sigma its mean and deviation over the pixels
+around that lie on the same surface (same object, near the tangent plane), itself left out;
+k = outlier_width.
+
+    C <- clamp(C, mu - k sigma, mu + k sigma)
+
+The signals are direct and indirect light (specular light apart), where the frame has them, else its
+colour without emission. A rare bright pixel ("firefly") is energy that belongs to its neighbours as
+well, so what is cut off darkens the image: `Cleaned.energy_kept` says by how much.
+
+Source: GAMES202, lecture 13, outlier removal: a window of 7x7 or 5x5, mu -+ k sigma.
+
+Departures: the pixel itself is no part of mu and sigma (in a 5x5 window it could never be farther
+than 4.8 sigma from a mean that counts it), neither is another surface; with fewer than
+`FEWEST` neighbours nothing changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from render.frame import Frame
+
+from .demodulation import Texture, read_texture
+from .parameters import check_positive, check_radius
+from .stencil import Float, Offset, Planes, Stencil, Step, Taps
+from .surface import GUIDES, check_size, read_surface, repair
+
+FEWEST = 4
+_PARTS = ("direct", "indirect", "specular")
+
+
+@dataclass(frozen=True)
+class RemoveOutliers:
+    """The stage.
+
+    Attributes:
+        outlier_width: k, in deviations. outlier_radius: of the window, 1 to 8 pixels.
+        outlier_plane: distance from the tangent plane over depth within which a pixel counts.
+    """
+
+    outlier_width: float = 3.0
+    outlier_radius: int = 2
+    outlier_plane: float = 0.02
+
+    def __post_init__(self) -> None:
+        check_positive(self, "outlier_width", "outlier_plane")
+        check_radius(self, "outlier_radius", largest=8)
+
+    def init(self, height: int, width: int) -> OutlierState:
+        """State before the first frame; InputError for an empty image."""
+        stencil = Stencil(height, width, self.outlier_radius)
+        signal, guides = stencil.planes([0.0] * 3), stencil.planes([-2.0, 0.0])
+        window = self.window
+        return OutlierState(stencil, signal, guides, signal.taps(window), guides.taps(window),
+                            Step(lambda *a: clamp(window, *a)))
+
+    @property
+    def window(self) -> list[Offset]:
+        side = range(-self.outlier_radius, self.outlier_radius + 1)
+        return [(dy, dx) for dy in side for dx in side if dy or dx]
+
+    def __call__(self, frame: Frame, state: OutlierState) -> tuple[Frame, OutlierState]:
+        """The frame with its colour (and parts) cleaned, and the state for the next one.
+
+        Raises:
+            InputError: a channel is missing, or the size is not the state's.
+        """
+        stencil = state.stencil
+        check_size(frame, stencil)
+        surface = read_surface(frame, stencil)
+        scale = dr.select(surface.exists, dr.abs(surface.plane_distance)
+                          * stencil.opaque(1 / self.outlier_plane), 1)
+        guides = [stencil.Float(surface.id), surface.inverse_depth, *surface.plane, scale]
+        dr.eval(guides)
+        state.guides.store(guides[:2])
+        width = [stencil.opaque(self.outlier_width)]
+        before = repair(np.asarray(frame["color"], np.float32), frame["id"])
+        images, color = {}, before
+        for name, given, texture in _lights(frame, before, stencil):
+            light = texture.remove(stencil.load(given))
+            dr.eval(light)
+            state.signal.store(light)
+            light = state.clamp(state.signal_taps, state.guide_taps, light, guides, width)
+            images[name] = stencil.image(texture.restore(light))
+            color = color + (images[name] - given)
+        if "specular" in images:
+            images["indirect"] = images["indirect"] + images["specular"]
+        images["color"] = color
+        after = replace(state, before=state.before + float(before.mean(dtype=np.float64)),
+                        after=state.after + float(color.mean(dtype=np.float64)))
+        cleaned = Frame(frame.index, {**frame.images, **images}, frame.camera_from_world,
+                        frame.screen_from_world, frame.world_from_object)
+        return cleaned, after
+
+
+@dataclass(frozen=True)
+class OutlierState:
+    """Planes of a signal and of the guides (ID, 1/z); mean radiance seen and let through."""
+
+    stencil: Stencil
+    signal: Planes
+    guides: Planes
+    signal_taps: Taps
+    guide_taps: Taps
+    clamp: Step
+    before: float = 0.0
+    after: float = 0.0
+
+
+def _lights(frame: Frame, color: np.ndarray,
+            stencil: Stencil) -> Iterator[tuple[str, np.ndarray, Texture]]:
+    """(channel, its image, its texture); `indirect` without what is specular."""
+    texture = read_texture(frame, stencil, True)
+    if not all(name in frame for name in _PARTS[:2]):
+        yield "color", color, texture
+        return
+    plain = Texture(texture.albedo, [])
+    parts = {name: repair(np.asarray(frame[name], np.float32), frame["id"])
+             for name in _PARTS if name in frame}
+    yield "direct", parts["direct"], plain
+    if "specular" in parts:
+        yield "specular", parts["specular"], Texture([], [])
+        parts["indirect"] = parts["indirect"] - parts["specular"]
+    yield "indirect", parts["indirect"], plain
+
+
+def clamp(window: list[Offset], signal: Taps, guides: Taps, center: list[Float],
+          center_guides: list[Float], width: list[Float]) -> list[Float]:
+    """Each channel within mu -+ k sigma of the window's pixels on the same surface."""
+    id_, inverse_depth, gx, gy, scale = center_guides
+    float_t = type(inverse_depth)
+    count, sums, squares = float_t(0), [float_t(0)] * 3, [float_t(0)] * 3
+    for i, (dy, dx) in enumerate(window):
+        tap_id, tap_inverse_depth = guides.at(i)
+        expected = dr.fma(gx, float(dx), dr.fma(gy, float(dy), inverse_depth))
+        alike = (tap_id == id_) & (dr.abs(tap_inverse_depth - expected) * scale < 1)
+        count += dr.select(alike, float_t(1), 0)
+        for c, value in enumerate(signal.at(i)):
+            value = dr.select(alike, value, 0)
+            sums[c] = sums[c] + value
+            squares[c] = dr.fma(value, value, squares[c])
+        signal.next()
+    result = []
+    for value, total, square in zip(center, sums, squares, strict=True):
+        mean = total / count
+        variance = dr.fma(-mean, mean, square / count)
+        reach = width[0] * dr.sqrt(dr.select(variance > 0, variance, 0))
+        low, high = mean - reach, mean + reach
+        clamped = dr.select(value < low, low, dr.select(value > high, high, value))
+        result.append(dr.select(count >= FEWEST, clamped, value))
+    return result
+
+
+@dataclass(frozen=True)
+class WithoutOutliers:
+    """A method that is given frames without outliers."""
+
+    method: Any
+    outliers: RemoveOutliers = field(default_factory=RemoveOutliers)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(("color", *GUIDES, *self.method.needs)))
+
+    @property
+    def uses(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys((*_PARTS, *getattr(self.method, "uses", ()))))
+
+    def init(self, height: int, width: int) -> Cleaned:
+        return Cleaned(self.outliers.init(height, width), self.method.init(height, width))
+
+    def __call__(self, frame: Frame, state: Cleaned) -> tuple[np.ndarray, Cleaned]:
+        frame, outliers = self.outliers(frame, state.outliers)
+        image, inner = self.method(frame, state.inner)
+        return image, Cleaned(outliers, inner)
+
+
+@dataclass(frozen=True)
+class Cleaned:
+    """State of the stage and of the method after it."""
+
+    outliers: OutlierState
+    inner: Any
+
+    @property
+    def energy_kept(self) -> float:
+        """Mean radiance after the stage over that before, of all frames so far."""
+        return self.outliers.after / self.outliers.before if self.outliers.before else 1.0
+
+
+def energy_kept(state: Any) -> float | None:
+    """`Cleaned.energy_kept`; None for a method without the stage."""
+    return state.energy_kept if isinstance(state, Cleaned) else None

@@ -1,0 +1,35 @@
+"""Weighted sums over taps that few pixels need.
+
+A loop that the other lanes do not enter: a packet of lanes of which none is wanted skips it. Its
+taps are gathers, since a shifted view would be read by every lane.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import drjit as dr
+
+from .stencil import Float, Stencil
+
+_while_loop: Any = dr.while_loop  # its type hints know loops of one variable only
+
+
+def weighted_sums(stencil: Stencil, wanted: Any, taps: int, count: int,
+                  tap: Callable[[Any], tuple[Float, list[Float]]]) -> tuple[Float, list[Float]]:
+    """Sum of the weights, and of `count` weighted values, over taps 0 to `taps` - 1.
+
+    Args:
+        wanted: mask; elsewhere all sums are 0.
+        tap: index of a tap (an Int array) to its weight and values.
+    """
+    def body(i: Any, total: Float, sums: list[Float]) -> tuple:
+        weight, values = tap(i)
+        return i + 1, total + weight, [dr.fma(weight, v, s) for v, s in zip(values, sums)]
+
+    zeros = [dr.zeros(stencil.Float, stencil.lanes) for _ in range(count + 1)]
+    _, total, sums = _while_loop(
+        (dr.select(wanted, stencil.Int(0), taps), zeros[0], zeros[1:]),
+        lambda i, total, sums: i < taps, body, labels=("tap", "total", "sums"))
+    return total, sums

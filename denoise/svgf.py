@@ -1,0 +1,241 @@
+"""Spatiotemporal variance-guided filtering (SVGF) as published.
+
+Direct and indirect light without texture are accumulated with the history of the same surface
+(`history.py`), their variance is estimated over time (`moments.py`), and an a-trous filter guided
+by it removes what noise is left (`wavelet.py`). The first level's output is the next frame's
+history.
+
+Source: Schied et al. 2017, "Spatiotemporal variance-guided filtering: real-time reconstruction for
+path-traced global illumination". Defaults are its constants; `longest` is 32 in NVIDIA's pass.
+
+Departures, beside those that the three modules list:
+- A frame without direct and indirect light (an import) is one signal, its colour.
+- No tone mapping and no temporal anti-aliasing after the filter: scores compare radiance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
+
+import drjit as dr
+import numpy as np
+
+from render.errors import InputError
+from render.frame import Frame
+
+from .atrous import EPSILON, LARGEST_LEVELS, LOG2E, luminance_scale, with_green
+from .demodulation import Texture, read_texture
+from .history import no_history, pack_records
+from .lanes import OnLanes
+from .moments import SHORT, accumulate, estimate_variances, tabulate
+from .parameters import check_positive, check_range
+from .reprojection import check_motion, load_table, motion_table
+from .stencil import Float, Planes, Stencil, Step, Taps
+from .surface import Surface, camera_from_screen, luminance, repair
+from .wavelet import OUTSIDE, WINDOW_5x5, filter_level, read_guides
+
+WINDOW_3x3 = [(dy, dx) for dy, dx in WINDOW_5x5 if max(abs(dy), abs(dx)) == 1]
+SIGNALS = ("direct", "indirect")
+
+
+@dataclass(frozen=True)
+class Svgf(OnLanes):
+    """Accumulation over frames, then an a-trous filter guided by the variance (SVGF).
+
+    Attributes:
+        alpha, alpha_moments: least weight of the current frame in colour and in moments.
+        longest: history length that is not exceeded, frames.
+        levels: 1 to 8; the last one's taps lie 2^(levels - 1) pixels apart.
+        sigma_luminance: in deviations. sigma_depth: in slopes of the surface.
+        normal_power: exponent of the cosine between normals.
+        min_cosine, plane_tolerance: tests of history, see `reprojection.py`.
+
+        The rest are the method's parts, to be switched off one by one:
+        demodulate: filter light without texture. split: direct and indirect light apart.
+        accumulate: use history. fallback: 3x3 pixels where no bilinear tap passes.
+        temporal_variance: from history, not from a window in every frame.
+        feedback: the first level's output is the history, not what went into it.
+    """
+
+    alpha: float = 0.2
+    alpha_moments: float = 0.2
+    longest: float = 32.0
+    levels: int = 5
+    sigma_luminance: float = 4.0
+    sigma_depth: float = 1.0
+    normal_power: float = 128.0
+    min_cosine: float = 0.9
+    plane_tolerance: float = 0.02
+    demodulate: bool = True
+    split: bool = True
+    accumulate: bool = True
+    fallback: bool = True
+    temporal_variance: bool = True
+    feedback: bool = True
+
+    uses: ClassVar[tuple[str, ...]] = SIGNALS
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.levels, int) or not 1 <= self.levels <= LARGEST_LEVELS:
+            raise InputError(f"levels is {self.levels}: "
+                             f"use a whole number from 1 to {LARGEST_LEVELS}")
+        for name in ("alpha", "alpha_moments"):
+            check_range(self, name, 1e-6, 1.0)
+        check_range(self, "longest", 1.0, 1e6)
+        check_range(self, "min_cosine", -1.0, 1.0)
+        check_positive(self, "sigma_luminance", "sigma_depth", "normal_power", "plane_tolerance")
+
+    @property
+    def reach(self) -> int:
+        return 2 << (self.levels - 1)
+
+    def init_on(self, stencil: Stencil) -> SvgfState:
+        return SvgfState(stencil, no_history(stencil))
+
+    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
+                 state: Any) -> tuple[list[Float], Any]:
+        """`color` is used where the frame is one signal."""
+        lights, texture = self.read_lights(frame, color, state.stencil)
+        filtered, state = self.filter_lights(frame, lights, surface, state, [])
+        return texture.restore([sum(c[1:], c[0]) for c in zip(*filtered)]), state
+
+    def read_lights(self, frame: Frame, color: list[Float],
+                    stencil: Stencil) -> tuple[list[list[Float]], Texture]:
+        """The signals, (r, g, b) each, and what was taken out of their sum."""
+        texture = read_texture(frame, stencil, self.demodulate)
+        if not self.split or not all(name in frame for name in SIGNALS):
+            return [texture.remove(color)], texture
+        direct, indirect, emission = (
+            stencil.load(repair(np.asarray(frame[name], np.float32), frame["id"]))
+            if name in frame else [] for name in (*SIGNALS, "emission"))
+        plain = Texture(texture.albedo, [])
+        return ([plain.remove(light) for light in (direct, indirect)],
+                Texture(texture.albedo, emission))
+
+    def alphas(self, count: int) -> list[float]:
+        """alpha of each signal."""
+        return [self.alpha] * count
+
+    def filter_lights(self, frame: Frame, lights: list[list[Float]], surface: Surface,
+                      state: Any, changes: list[Float]) -> tuple[list[list[Float]], Any]:
+        """Each signal (r, g, b) filtered, and the state for the next frame.
+
+        changes: lambda of each signal (see `moments.py`), or none.
+        """
+        stencil = state.stencil
+        previous = state.previous or frame
+        check_motion(previous, frame)
+        works = state.works
+        if works is None or len(works.filters) != len(lights):
+            works = Works.make(self, stencil, len(lights))
+        signal = [c for r, g, b in lights for c in (r, luminance([r, g, b]), b)]
+        near = [surface.id, *surface.normal, surface.depth]
+        guides = read_guides(stencil, surface, self.sigma_depth)
+        dr.eval(signal, near, guides)
+        works.guides.store(guides[:4])
+        table = load_table(motion_table(previous, frame), stencil)
+        dual = [stencil.opaque(x) for x in camera_from_screen(previous).T.ravel()]
+        numbers = [stencil.opaque(x) for x in (self.alpha_moments, self.longest, self.min_cosine,
+                                               self.plane_tolerance)]
+        colors, moments, lengths, window = works.accumulate(
+            signal, near, [table], dual, [state.records], guides, changes,
+            [stencil.opaque(a) for a in self.alphas(len(lights))], numbers)
+        half_power = stencil.opaque(LOG2E * self.normal_power / 2)
+        enough = stencil.opaque(SHORT if self.temporal_variance else 2 * self.longest + 1)
+        variances = works.estimate(moments, lengths, guides, [window], [half_power, enough])
+        numbers = [stencil.opaque(EPSILON), stencil.opaque(self.sigma_luminance / LOG2E),
+                   half_power]
+        lights, kept = [], []
+        for s, part in enumerate(works.filters):
+            given = [*colors[3 * s:3 * s + 3], variances[s]]
+            first, last = part.apply(given, guides, numbers)
+            lights.append(with_green(last))
+            kept += (first if self.feedback else given)[:3]
+        records = state.records
+        if self.accumulate:
+            records = works.pack(near, kept, moments, lengths)
+        seen = Frame(frame.index, {"id": frame["id"]}, frame.camera_from_world,
+                     frame.screen_from_world, frame.world_from_object)
+        return lights, replace(state, works=works, records=records, previous=seen)
+
+
+@dataclass(frozen=True)
+class SvgfState:
+    """Records of the previous frame and its matrices; planes and steps once they are made."""
+
+    stencil: Stencil
+    records: Float = field(repr=False)
+    previous: Frame | None = None
+    works: Works | None = None
+
+
+@dataclass(frozen=True)
+class Works:
+    """Planes of the guides (n, z), the recorded steps, and a filter for each signal."""
+
+    guides: Planes
+    accumulate: Step
+    estimate: Step
+    filters: list[Levels]
+    pack: Step
+
+    @staticmethod
+    def make(method: Svgf, stencil: Stencil, count: int) -> Works:
+        guides = stencil.planes(OUTSIDE)
+
+        def blend(signal: list[Float], near: list[Float], table: list[Float], dual: list[Float],
+                  records: list[Float], guides: list[Float], *rest: list[Float]) -> Any:
+            colors, moments, lengths = accumulate(stencil, method.fallback, signal, near, table,
+                                                  dual, records, *rest)
+            window = tabulate(stencil, moments, guides)
+            dr.eval(colors, moments, lengths, window)
+            return colors, moments, lengths, window
+
+        def estimate(*arguments: Any) -> list[Float]:
+            return estimate_variances(stencil, *arguments)
+
+        def pack(near: list[Float], colors: list[Float], moments: list[Float],
+                 lengths: list[Float]) -> Float:
+            values = [c for s in range(count)
+                      for c in (*colors[3 * s:3 * s + 3], *moments[2 * s:2 * s + 2])]
+            return pack_records(stencil, near, [*lengths, *values])
+
+        return Works(guides, Step(blend), Step(estimate),
+                     [Levels.make(stencil, guides, method.levels) for _ in range(count)],
+                     Step(pack))
+
+
+@dataclass(frozen=True)
+class Levels:
+    """The a-trous filter of one signal: its planes (r, l, b, v), their taps and the steps."""
+
+    signal: Planes
+    blur_taps: Taps
+    level_taps: list[tuple[Taps, Taps]]
+    spacings: list[Float]
+    scale_steps: list[Step]
+    level_steps: list[Step]
+
+    @staticmethod
+    def make(stencil: Stencil, guides: Planes, levels: int) -> Levels:
+        signal = stencil.planes([0.0] * 4)
+        taps = []
+        for i in range(levels):
+            offsets = [(dy << i, dx << i) for dy, dx in WINDOW_5x5]
+            taps.append((signal.taps(offsets), guides.taps(offsets)))
+        return Levels(signal, signal.taps(WINDOW_3x3), taps,
+                      [stencil.opaque(1 << i) for i in range(levels)],
+                      [Step(luminance_scale) for _ in taps], [Step(filter_level) for _ in taps])
+
+    def apply(self, signal: list[Float], guides: list[Float],
+              numbers: list[Float]) -> tuple[list[Float], list[Float]]:
+        """What the first and the last level give; numbers: eps, sigma_luminance, half_power."""
+        first = signal
+        for i, taps in enumerate(self.level_taps):
+            self.signal.store(signal)
+            scale = self.scale_steps[i](self.blur_taps, signal[3:], numbers)
+            signal = self.level_steps[i](*taps, signal, guides, [scale],
+                                         [self.spacings[i], numbers[2]])
+            first = signal if i == 0 else first
+        return first, signal

@@ -1,0 +1,141 @@
+"""Parameters by measurement: a coordinate search for the best mean PSNR over given sequences.
+
+Each parameter in turn is tried a step up and down (numbers above 0 by a factor, whole numbers by 1,
+switches turned over); a better value is kept. When a round brings nothing, the factor gets smaller.
+It is a local search of a noisy function: what it finds is a default, not an optimum. Tune on other
+frames and seeds than those that are reported.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+import numpy as np
+
+from render.atomic import write_text
+from render.errors import InputError
+from render.frame import Frame
+from render.sequence import Sequence
+
+from .methods import Method, build, channels_read, parameters
+from .metrics import psnr
+from .tonemap import srgb_from_linear
+
+FACTORS = (2.0, 1.4, 1.15)
+LEAST_GAIN = 0.003  # dB; less is not worth another number
+
+Settings = dict[str, bool | int | float]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A sequence in memory: frames, and display values of their references."""
+
+    name: str
+    frames: list[Frame]
+    references: list[np.ndarray]
+
+
+def read_case(sequence: Sequence, method: Method) -> Case:
+    """The frames that have a reference.
+
+    Raises:
+        InputError: there is none, or a frame lacks what the method needs.
+    """
+    numbers = [i for i in sequence.frames if sequence.has_frame(i) and sequence.has_reference(i)]
+    if not numbers:
+        raise InputError(f"{sequence.folder} has no reference to tune on: "
+                         "render one with --reference-spp")
+    channels = channels_read(method, sequence.manifest.channels)
+    return Case(sequence.folder.name,
+                [sequence.read_frame(i, list(channels)) for i in numbers],
+                [srgb_from_linear(sequence.read_reference(i).color) for i in numbers])
+
+
+def mean_psnr(method: Method, cases: list[Case]) -> float:
+    """dB on clipped sRGB: mean over the frames of a case, then over cases."""
+    means = []
+    for case in cases:
+        state, values = method.init(case.frames[0].height, case.frames[0].width), []
+        for frame, reference in zip(case.frames, case.references):
+            image, state = method(frame, state)
+            values.append(psnr(srgb_from_linear(image), reference))
+        means.append(fmean(values))
+    return fmean(means)
+
+
+def neighbours(value: Any, factor: float) -> Iterator[Any]:
+    """Values a step away."""
+    if isinstance(value, bool):
+        yield not value
+    elif isinstance(value, int):
+        yield from (value + 1, value - 1)
+    elif isinstance(value, float) and value > 0:
+        yield from (float(f"{value * factor:.3g}"), float(f"{value / factor:.3g}"))
+
+
+class Search:
+    """The search, and all that it has tried, which it can go on from.
+
+    Attributes:
+        tried: settings as JSON -> dB.
+    """
+
+    def __init__(self, name: str, start: Settings, cases: list[Case], file: Path | None = None,
+                 on_trial: Callable[[float], None] = lambda value: None) -> None:
+        self.name, self.cases, self.file, self.on_trial = name, cases, file, on_trial
+        self.start = start
+        self.tried: dict[str, float] = _read(file) if file and file.exists() else {}
+
+    def run(self, names: list[str], factors: tuple[float, ...] = FACTORS
+            ) -> tuple[Settings, float]:
+        """The best settings found, and their dB."""
+        best = dict(self.start)
+        value = self.value(best)
+        for factor in factors:
+            gained = True
+            while gained:
+                gained = False
+                for name in names:
+                    for candidate in neighbours(best[name], factor):
+                        other = self.try_value({**best, name: candidate})
+                        if other is not None and other > value + LEAST_GAIN:
+                            best, value, gained = {**best, name: candidate}, other, True
+                            break
+        return best, value
+
+    def try_value(self, settings: Settings) -> float | None:
+        """dB of settings; None for those that the method refuses."""
+        try:
+            return self.value(settings)
+        except InputError:
+            return None
+
+    def value(self, settings: Settings) -> float:
+        key = json.dumps(settings, sort_keys=True)
+        if key not in self.tried:
+            method = build(self.name, {k: str(v) for k, v in settings.items()})
+            self.tried[key] = mean_psnr(method, self.cases)
+            if self.file:
+                write_text(self.file, json.dumps(self.tried, indent=1) + "\n")
+        self.on_trial(self.tried[key])
+        return self.tried[key]
+
+
+def starting_point(name: str, given: Mapping[str, str]) -> Settings:
+    """Defaults of a method and what is given instead; InputError as from `build`."""
+    return {k: v for k, v in parameters(build(name, given)).items() if not isinstance(v, str)}
+
+
+def _read(file: Path) -> dict[str, float]:
+    try:
+        tried = json.loads(file.read_text())
+        return {str(key): float(value) for key, value in tried.items()}
+    except (OSError, ValueError, AttributeError, TypeError) as error:
+        raise InputError(f"{file} does not hold an earlier search ({error}): "
+                         "remove it, or give another --out") from error

@@ -1,0 +1,60 @@
+"""`onespp tune`: the parameters of a method by measurement."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from render.command import device_option, threads_option, use
+from render.errors import InputError
+from render.sequence import Sequence
+from render.terminal import progress
+
+from .parameters import pairs
+from .tonemap import TONE_MAP
+
+
+@click.command()
+@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path),
+                metavar="DIR...")
+@click.option("--method", default="onespp", show_default=True, metavar="NAME")
+@click.option("--parameter", "names", multiple=True, metavar="NAME",
+              help="Search this parameter; may be given several times. Default: all.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE",
+              help="Where the search starts; default the method's defaults.")
+@click.option("--out", type=click.Path(path_type=Path), metavar="FILE",
+              help="Keep what was tried in FILE (JSON); the same command goes on from there.")
+@device_option
+@threads_option
+def tune(folders: tuple[Path, ...], method: str, names: tuple[str, ...],
+         settings: tuple[str, ...], out: Path | None, device: str, threads: int | None) -> None:
+    """Search parameters of a method for the best mean PSNR on the sequences in DIR.
+
+    Give other frames and seeds than those that you report scores of.
+    """
+    use(device, threads)
+    from .methods import build
+    from .tune import FACTORS, Search, read_case, starting_point
+
+    start = starting_point(method, pairs(settings))
+    unknown = [name for name in names if name not in start]
+    if unknown:
+        raise InputError(f"method '{method}' has no parameter '{unknown[0]}': "
+                         f"it has {', '.join(start)}")
+    cases = [read_case(Sequence.open(folder), build(method)) for folder in folders]
+    with progress() as begin:
+        searched = list(names) or list(start)
+        least = 2 * len(searched) * len(FACTORS)  # trials; a round that gains adds more
+        steps, values = begin(f"tune {method}", least), []
+
+        def show(value: float) -> None:
+            values.append(value)
+            steps.advance(min(len(values), least), f"{max(values):.2f} dB")
+
+        search = Search(method, start, cases, out, show)
+        found, value = search.run(searched)
+    click.echo(f"{value:.2f} dB on {TONE_MAP}, mean over {', '.join(c.name for c in cases)}; "
+               f"{search.value(start):.2f} dB at the start; {len(search.tried)} settings tried")
+    changed = {k: v for k, v in found.items() if v != start[k]}
+    click.echo(" ".join(f"--set {k}={v}" for k, v in changed.items()) or "nothing better found")

@@ -1,0 +1,129 @@
+"""Temporal gradients: a few samples of the last frame, shaded again where their surfaces are now.
+
+In each 3x3 stratum of the last frame one pixel is picked. The surface point that it saw is moved
+with its object, and the camera of this frame looks at it with the random numbers that the pixel
+had in the last frame. What then differs from the last frame's radiance is a change of shading, not
+noise: in a scene in which nothing changes it is exactly 0.
+
+Both radiances are traced here, the last frame's too, so that any frame can be rendered alone: two
+paths for every nine pixels, beside the one path a pixel of the frame.
+
+Source: Schied et al. 2018, "Gradient estimation for real-time adaptive temporal filtering"
+(A-SVGF). Differs: the paper shades the old sample in place of one of this frame's; here it is one
+more, so that the frame's own samples stay independent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import drjit as dr
+import numpy as np
+
+from .path import trace
+from .rays import camera_matrices, pixel_rays
+from .sampler import FRAME_STREAM, GRADIENT_STREAM, keys_from_seed
+from .variant import mi
+
+if TYPE_CHECKING:
+    from .renderer import Renderer
+
+STRATUM = 3          # pixels, side
+NO_SAMPLE = -1.0     # luminance where there is none
+TOLERANCE = 1e-3     # of the distance: what lies nearer hides the point
+
+
+@dataclass
+class _Shaded:
+    """Luminance of direct and indirect light, and whether the camera sees the point."""
+
+    direct: mi.Float
+    indirect: mi.Float
+    seen: mi.Bool
+
+
+def replay(renderer: Renderer, index: int, previous: int | None,
+           seed: int) -> dict[str, np.ndarray]:
+    """The channels `replay` and `replay_before` of a frame, (h, w, 2) each.
+
+    Args:
+        previous: the frame before it, None for the first, which has no samples.
+    """
+    size = renderer.height, renderer.width
+    now, before = (np.full((*size, 2), NO_SAMPLE, np.float32) for _ in range(2))
+    if previous is not None:
+        row, column, shaded_now, shaded_before = _shade_both(renderer, index, previous, seed)
+        now[row, column], before[row, column] = shaded_now, shaded_before
+    return {"replay": now, "replay_before": before}
+
+
+def _shade_both(renderer: Renderer, index: int, previous: int,
+                seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Row and column in this frame, luminances (n, 2) now and before, of the samples seen."""
+    stage = renderer.stage
+    stage.pose(previous)
+    pixel = mi.UInt32(_picks(renderer.height, renderer.width, seed, previous))
+    rays = pixel_rays(stage, renderer.height, renderer.width)
+    row = pixel // renderer.width
+    ray, _ = rays.at(mi.Float(pixel - row * renderer.width) + 0.5, mi.Float(row) + 0.5)
+    with dr.suspend_grad():
+        si = stage.mi_scene.ray_intersect(ray)
+        point, id_ = mi.Point3f(si.p), stage.object_id(dr.reinterpret_array(mi.UInt32, si.shape))
+    dr.eval(point, id_)
+    old_places = stage.world_from_object()
+    old = _shade(renderer, previous, seed, pixel, point, id_)
+    stage.pose(index)
+    point = _moved(point, id_, stage.stage_from_stage(old_places))
+    new = _shade(renderer, previous, seed, pixel, point, id_)
+
+    camera = camera_matrices(renderer.scene.camera, index, renderer.height, renderer.width)
+    at = np.nan_to_num(point.numpy().astype(np.float64).T)
+    world = stage.origin + stage.unit * at
+    screen = world @ camera.screen_from_world[:, :3].T + camera.screen_from_world[:, 3]
+    seen = old.seen.numpy() & new.seen.numpy() & (screen[:, 3] > 0)
+    column, row = np.floor(screen[:, :2] / np.where(seen, screen[:, 3], np.inf)[:, None]).T
+    seen &= (column >= 0) & (row >= 0) & (column < renderer.width) & (row < renderer.height)
+    row, column = (a[seen].astype(np.int64) for a in (row, column))
+    now, before = (np.stack([s.direct.numpy(), s.indirect.numpy()], -1)[seen] for s in (new, old))
+    return row, column, now, before
+
+
+def _picks(height: int, width: int, seed: int, frame: int) -> np.ndarray:
+    """Index of one pixel in each stratum, uint32."""
+    rng = np.random.default_rng((seed, GRADIENT_STREAM, frame))
+    y, x = np.mgrid[:height:STRATUM, :width:STRATUM]
+    y += rng.integers(np.minimum(STRATUM, height - y))
+    x += rng.integers(np.minimum(STRATUM, width - x))
+    return (y * width + x).astype(np.uint32).ravel()
+
+
+def _moved(point: mi.Point3f, id_: mi.Int32, matrices: np.ndarray) -> mi.Point3f:
+    """Points moved with their objects; exactly what they were if those stand still."""
+    table = mi.Float(np.ascontiguousarray(matrices[:, :3], np.float32).ravel())
+    start = mi.UInt32(dr.maximum(id_, 0)) * 12
+    rows = [[dr.gather(mi.Float, table, start + 4 * r + c) for c in range(4)] for r in range(3)]
+    moved = mi.Point3f(*(dr.fma(a, point.x, dr.fma(b, point.y, dr.fma(c, point.z, d)))
+                         for a, b, c, d in rows))
+    dr.eval(moved)
+    return moved
+
+
+def _shade(renderer: Renderer, random_frame: int, seed: int, pixel: mi.UInt32, point: mi.Point3f,
+           id_: mi.Int32) -> _Shaded:
+    """What the camera of the posed frame sees at points, with a frame's random numbers."""
+    stage, scene = renderer.stage, renderer.stage.mi_scene
+    with dr.suspend_grad():
+        origin = pixel_rays(stage, renderer.height, renderer.width).origin
+        toward = point - origin
+        distance = dr.norm(toward)
+        ray = mi.Ray3f(origin, toward / distance)
+        pi = scene.ray_intersect_preliminary(ray, coherent=True)
+        met = stage.object_id(dr.reinterpret_array(mi.UInt32, pi.shape))
+        seen = (id_ >= 0) & (met == id_) & (dr.abs(pi.t - distance) < TOLERANCE * distance)
+        sampler = renderer.new_sampler(keys_from_seed(seed, FRAME_STREAM, random_frame), pixel)
+        radiance = trace(scene, ray, pi, sampler, renderer.scene.max_depth,
+                         renderer.direct == "resampled")
+        shaded = _Shaded(mi.luminance(radiance.direct), mi.luminance(radiance.indirect), seen)
+    dr.eval(shaded.direct, shaded.indirect, shaded.seen)
+    return shaded

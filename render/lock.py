@@ -1,0 +1,115 @@
+"""One writer at a time for each part of a sequence: a lock that ends with its process.
+
+The operating system holds the lock on `.PART.lock` for as long as that file is open, so a process
+that dies, however it dies, leaves none: a file that is left over is taken by the next writer,
+whatever process or host it names. Its text says who writes, for the message to a second writer.
+
+Parts are what commands write: `render` (frames and references; an import too), `denoise-METHOD`,
+`time`, `score`, `report`. Different parts may be written at once. Where the system or the file
+system knows no locks (Windows; some network drives) writers are not told of each other.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import os
+import platform
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from .atomic import explain
+from .cleaning import check_links, remove_leftovers
+from .errors import InputError
+from .manifest import check_name
+
+try:
+    import fcntl
+except ImportError:
+    fcntl = None
+
+_RESULTS = "denoise-"
+_PLACES = {"render": ("frames/*", "reference/*", "*.manifest.json"), "time": ("*.times.json",),
+           "score": ("pictures/*", "*.scores.*"), "report": ("report/**/*",)}
+
+
+@contextmanager
+def writing(folder: Path, part: str, alone: bool = False) -> Iterator[None]:
+    """Holds the lock on a part of the sequence in a folder, which is made if it is not there.
+
+    What a killed writer of this part left half written is removed first.
+
+    Args:
+        part: `render`, `time`, `score`, `report`, or `denoise-` and the name of the results.
+        alone: nobody may write another part either, as when all is removed.
+
+    Raises:
+        InputError: somebody else writes it, or the folder cannot be written, or a folder in it
+            is a link that leads outside.
+    """
+    if part.startswith(_RESULTS):
+        check_name(part[len(_RESULTS):], "method")
+    made = not folder.exists()
+    try:
+        with ExitStack() as held:
+            _take(held, folder, part, alone)
+            check_links(folder)
+            remove_leftovers(folder, *_PLACES.get(part, (f"denoised/{part[len(_RESULTS):]}/*",)))
+            yield
+    finally:
+        if made:
+            with contextlib.suppress(OSError):  # holds something, as it should
+                folder.rmdir()
+
+
+def _take(held: ExitStack, folder: Path, part: str, alone: bool) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        others = sorted(folder.glob(".*.lock")) if alone else []
+        for path in dict.fromkeys((folder / f".{part}.lock", *others)):
+            held.enter_context(_locked(path))
+    except OSError as error:
+        raise InputError(explain(folder, error)) from error
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    descriptor = _open(path)
+    try:
+        who = (f"process {os.getpid()} on {platform.node()} since "
+               f"{datetime.datetime.now().astimezone().isoformat(' ', 'seconds')}")
+        with contextlib.suppress(OSError):  # a full disk; --overwrite may be about to help
+            os.truncate(descriptor, 0)
+            os.write(descriptor, who.encode())
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            path.unlink()  # while it is locked, so that it is ours
+        os.close(descriptor)
+
+
+def _open(path: Path) -> int:
+    """A descriptor that has the lock; InputError where another has it."""
+    while True:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
+        try:
+            if fcntl is not None:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            who = os.read(descriptor, 300).decode(errors="replace")
+            os.close(descriptor)
+            raise InputError(_busy(path, who)) from None
+        except OSError:
+            return descriptor  # this file system has no locks
+        with contextlib.suppress(OSError):
+            if os.path.samestat(os.stat(path), os.fstat(descriptor)):
+                return descriptor
+        os.close(descriptor)  # the one before us removed the file between open and lock
+
+
+def _busy(path: Path, who: str) -> str:
+    who = "".join(c for c in who if c.isprintable()) or "another process"
+    what = path.name[1:-len(".lock")].replace("-", " ", 1)
+    return (f"{path.parent} is being written by another `{what}` ({who}): wait for it, stop it, "
+            "or use another folder")

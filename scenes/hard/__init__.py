@@ -1,0 +1,73 @@
+"""Small scenes that each isolate one thing that denoisers and renderers get wrong.
+
+All are 96x64 and ten frames long; where something happens at once, it happens at frame `EVENT`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from ..description import Scene
+from .camera import backwards, cut, grazing
+from .extent import far, huge, sky, tiny
+from .light import color, emitters, fireflies, moving_light, switched_off, switched_on
+from .motion import (
+    appears,
+    behind,
+    enters,
+    leaves,
+    mirrored,
+    shrinks,
+    uncovers,
+    vanishes,
+)
+from .parts import EVENT
+from .reflection import glossy_floor, mirror
+from .surface import dark, textured, thin
+
+
+@dataclass(frozen=True)
+class Hard:
+    """A hard scene.
+
+    Attributes:
+        make: the scene. event: the frame at which everything changes at once, None: none does.
+        diffuse: whether all of it is diffuse and no light is too small to be found: a method
+            that loses or makes energy there has no excuse.
+    """
+
+    make: Callable[[], Scene]
+    event: int | None = None
+    diffuse: bool = True
+
+
+HARD: Mapping[str, Hard] = MappingProxyType({
+    "cut": Hard(cut, EVENT),
+    "switched-on": Hard(switched_on, EVENT),
+    "switched-off": Hard(switched_off, EVENT),
+    "color": Hard(color, EVENT),
+    "moving-light": Hard(moving_light),
+    "emitters": Hard(emitters),
+    "fireflies": Hard(fireflies, diffuse=False),
+    "mirror": Hard(mirror, diffuse=False),
+    "glossy-floor": Hard(glossy_floor, diffuse=False),
+    "backwards": Hard(backwards),
+    "grazing": Hard(grazing),
+    "uncovers": Hard(uncovers),
+    "enters": Hard(enters),
+    "leaves": Hard(leaves),
+    "appears": Hard(appears, EVENT),
+    "vanishes": Hard(vanishes, EVENT),
+    "shrinks": Hard(shrinks),
+    "mirrored": Hard(mirrored, EVENT),
+    "behind": Hard(behind),
+    "thin": Hard(thin),
+    "textured": Hard(textured),
+    "dark": Hard(dark),
+    "sky": Hard(sky),
+    "far": Hard(far),
+    "tiny": Hard(tiny),
+    "huge": Hard(huge),
+})

@@ -1,0 +1,157 @@
+"""SVGF in float64 NumPy, as plainly as it can be written: nothing is shared with the kernels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from denoise import oracles
+from denoise.oracles import Pixels, blur3x3, luminance, pairs
+from render.frame import Frame
+
+
+def depth_slope(frame: Frame) -> np.ndarray:
+    """(h, w, 2) change of depth along x and y on each pixel's tangent plane."""
+    h, w = frame["id"].shape
+    world_from_camera = np.linalg.inv(frame.camera_from_world)
+    b = np.linalg.inv((frame.screen_from_world @ world_from_camera)[[0, 1, 3], :3])
+    y, x = np.mgrid[:h, :w] + 0.5
+    n = frame["normal"] @ frame.camera_from_world[:3, :3].T
+
+    def depth_at(dx: float, dy: float) -> np.ndarray:
+        """Where the ray through a moved pixel meets the plane."""
+        here = np.stack([x, y, np.ones_like(x)], -1) @ b.T
+        there = np.stack([x + dx, y + dy, np.ones_like(x)], -1) @ b.T
+        return frame["depth"] * (n * here).sum(-1) / (n * there).sum(-1)
+
+    with np.errstate(all="ignore"):
+        slope = [(depth_at(e, 0) - depth_at(-e, 0)) / (2 * e) for e in (1e-4,)]
+        slope += [(depth_at(0, e) - depth_at(0, -e)) / (2 * e) for e in (1e-4,)]
+    return np.where(frame["id"][..., None] >= 0, np.stack(slope, -1), 0)
+
+
+def pixels_of(frame: Frame, **more: np.ndarray) -> Pixels:
+    return oracles.read(frame, slope=depth_slope(frame), **more)
+
+
+def geometry_weight(p: Pixels, q: Pixels, dy: int, dx: int, sigma_depth: float,
+                    power: float) -> np.ndarray:
+    both = (p.surface > 0) & (q.surface > 0)
+    cosine = np.where(both, np.maximum((p.n * q.n).sum(-1), 0), 1)
+    slope = np.abs(p.slope[..., 0] * dx + p.slope[..., 1] * dy)
+    depth = np.abs(p.z - q.z) / np.where(both, sigma_depth * slope + 1e-3 * p.z, 1)
+    return np.where(p.surface == q.surface, cosine**power * np.exp(-np.where(both, depth, 0)), 0)
+
+
+def spatial_moments(frame: Frame, moments: np.ndarray, sigma_depth: float,
+                    power: float) -> np.ndarray:
+    """(h, w, 2) means over 7x7."""
+    shape = frame["id"].shape
+    pixels, total, weights = pixels_of(frame, m=moments), np.zeros((*shape, 2)), np.zeros(shape)
+    for dy in range(-3, 4):
+        for dx in range(-3, 4):
+            where, p, q = pairs(pixels, shape, dy, dx)
+            if where is None:
+                continue
+            w = geometry_weight(p, q, dy, dx, sigma_depth, power)
+            total[where] += w[..., None] * q.m
+            weights[where] += w
+    return total / weights[..., None]
+
+
+def level(frame: Frame, color: np.ndarray, variance: np.ndarray, step: int, sigma_luminance: float,
+          sigma_depth: float, power: float) -> tuple[np.ndarray, np.ndarray]:
+    shape = frame["id"].shape
+    h = {0: 3 / 8, 1: 1 / 4, 2: 1 / 16}
+    pixels = pixels_of(frame, c=color, v=variance, l=luminance(color),
+                       sigma_l=sigma_luminance * np.sqrt(blur3x3(variance)) + 1e-6)
+    total, squares, weights = np.zeros((*shape, 3)), np.zeros(shape), np.zeros(shape)
+    for ky in range(-2, 3):
+        for kx in range(-2, 3):
+            where, p, q = pairs(pixels, shape, ky * step, kx * step)
+            if where is None:
+                continue
+            w = (h[abs(ky)] * h[abs(kx)] * np.exp(-np.abs(p.l - q.l) / p.sigma_l)
+                 * geometry_weight(p, q, ky * step, kx * step, sigma_depth, power))
+            total[where] += w[..., None] * q.c
+            squares[where] += w**2 * q.v
+            weights[where] += w
+    return total / weights[..., None], squares / weights**2
+
+
+def look_up(previous: Frame, frame: Frame, values: np.ndarray, fallback: bool,
+            min_cosine: float, plane_tolerance: float) -> np.ndarray:
+    """(h, w, c) history: tested bilinear taps, else the 3x3 mean of those that pass, else NaN."""
+    h, w = frame["id"].shape
+    screen, result = oracles.previous_screen(previous, frame), np.full(values.shape, np.nan)
+    for y, x in np.argwhere(frame["id"] >= 0):
+        i = frame["id"][y, x]
+        motion = previous.world_from_object[i] @ np.linalg.inv(frame.world_from_object[i])
+        n = motion[:3, :3] @ frame["normal"][y, x]
+        world = (motion @ np.append(frame["position"][y, x].astype(np.float64), 1))[:3]
+        px, py, z = screen[y, x]
+        if not (0 <= px < w and 0 <= py < h):
+            continue
+
+        def passes(ty, tx, i=i, n=n, world=world, z=z):
+            if not (0 <= tx < w and 0 <= ty < h) or previous["id"][ty, tx] != i:
+                return False
+            off_plane = abs(n @ (previous["position"][ty, tx] - world))
+            return n @ previous["normal"][ty, tx] > min_cosine and off_plane < plane_tolerance * z
+
+        left, top = int(np.floor(px - 0.5)), int(np.floor(py - 0.5))
+        taps = [((1 - abs(px - 0.5 - tx)) * (1 - abs(py - 0.5 - ty)), ty, tx)
+                for ty in (top, top + 1) for tx in (left, left + 1)]
+        taps = [tap for tap in taps if passes(*tap[1:])]
+        if sum(t[0] for t in taps) < 0.01 and fallback:
+            taps = [(1.0, int(py) + dy, int(px) + dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1)
+                    if passes(int(py) + dy, int(px) + dx)]
+        if sum(t[0] for t in taps) >= 0.01:
+            result[y, x] = (sum(t[0] * values[t[1], t[2]] for t in taps)
+                            / sum(t[0] for t in taps))
+    return result
+
+
+def svgf(frames: list[Frame], alpha: float = 0.2, alpha_moments: float = 0.2, longest: float = 32,
+         levels: int = 5, sigma_luminance: float = 4, sigma_depth: float = 1,
+         normal_power: float = 128, min_cosine: float = 0.9, plane_tolerance: float = 0.02,
+         demodulate: bool = True, split: bool = True, accumulate: bool = True,
+         fallback: bool = True, temporal_variance: bool = True,
+         feedback: bool = True) -> np.ndarray:
+    """The last frame's result; parameters as of `denoise.svgf.Svgf`."""
+    records, previous, result = None, frames[0], np.zeros(0)
+    for frame in frames:
+        shape = frame["id"].shape
+        albedo = np.maximum(frame["albedo"], 0.01) if demodulate else np.ones((*shape, 3))
+        albedo = np.where((frame["albedo"] < 0.01).all(-1, keepdims=True), 1, albedo)
+        names = ("direct", "indirect") if split else ("color",)
+        emission = frame["emission"].astype(np.float64) if split or demodulate else 0
+        lights = [frame[n] / albedo if split else (frame["color"] - emission) / albedo
+                  for n in names]
+        now = [np.concatenate([c, luminance(c)[..., None], luminance(c)[..., None]**2], -1)
+               for c in lights]
+        old = np.full((*shape, 1 + 5 * len(now)), np.nan)
+        if records is not None and accumulate:
+            old = look_up(previous, frame, records, fallback, min_cosine, plane_tolerance)
+        found = np.isfinite(old[..., :1])
+        length = np.where(found, np.minimum(old[..., :1] + 1, longest), 1)
+        weight = np.concatenate([np.maximum(a, 1 / length) for a in
+                                 (alpha, alpha, alpha, alpha_moments, alpha_moments)], -1)
+        kept, result = [length], np.zeros((*shape, 3))
+        for s, signal in enumerate(now):
+            before = old[..., 1 + 5 * s:6 + 5 * s]
+            mixed = np.where(found, weight * signal + (1 - weight) * before, signal)
+            spatial = (length < 4) if temporal_variance else np.full(length.shape, True)
+            moments = np.where(spatial, spatial_moments(frame, mixed[..., 3:], sigma_depth,
+                                                        normal_power), mixed[..., 3:])
+            variance = (np.maximum(moments[..., 1] - moments[..., 0]**2, 0)
+                        * np.maximum(4 / length[..., 0], 1))
+            color, first = mixed[..., :3], mixed[..., :3]
+            for i in range(levels):
+                color, variance = level(frame, color, variance, 1 << i, sigma_luminance,
+                                        sigma_depth, normal_power)
+                first = color if i == 0 else first
+            kept += [first if feedback else mixed[..., :3], mixed[..., 3:]]
+            result += color
+        records, previous = np.concatenate(kept, -1), frame
+        result = result * albedo + emission
+    return result

@@ -1,0 +1,176 @@
+"""The filtered innovation against float64, its signals, and how it follows a change of light."""
+
+from __future__ import annotations
+
+import innovation_oracle
+import numpy as np
+import pytest
+from kernels import compiled, taking_turns
+from synthetic import make_frame, noisy, translation, with_images
+from test_svgf import moving
+
+from denoise.filtered_innovation import FilteredInnovation
+from denoise.signals import USED, read_signals
+from denoise.stencil import Stencil
+from denoise.surface import read_color
+from render.errors import InputError
+
+
+def run(method, frames):
+    image, state = method(frames[0], method.init(frames[0].height, frames[0].width))
+    for frame in frames[1:]:
+        image, state = method(frame, state)
+    return image, state
+
+
+def split(height, width, count=3):
+    """Moving frames with all channels that the method uses, and a lamp."""
+    frames = []
+    for i, frame in enumerate(moving(height, width, count)):
+        rng = np.random.default_rng(100 + i)
+        there = frame["id"][..., None] >= 0
+        albedo = frame["albedo"].copy()
+        albedo[:height // 3, :width // 4] = 0
+        unshadowed = np.where(there, albedo * [1.0, 0.8, 0.6] * rng.uniform(0.5, 1, (1, 1, 3)), 0)
+        visibility = (rng.random((height, width)) < 0.6) * rng.gamma(4, 0.3, (height, width))
+        direct = unshadowed * visibility[..., None] * rng.uniform(0.9, 1.1, (1, 1, 3))
+        specular = 0.3 * frame["indirect"] * rng.random((height, width, 1))
+        color = frame["emission"] + direct + frame["indirect"]
+        frames.append(with_images(frame, albedo=albedo, unshadowed=unshadowed, color=color,
+                                  visibility=visibility, direct=direct, specular=specular))
+    return frames
+
+
+@pytest.mark.parametrize(("height", "width"), [(19, 26), (7, 5), (1, 9)])
+def test_it_is_the_formula_in_float64(height, width):
+    frames = split(height, width)
+    method = FilteredInnovation(smoothing=4, levels=3, sharp_smoothing=2, sharp_levels=2)
+    image, _ = run(method, frames)
+    expected = innovation_oracle.run(frames, method)
+    np.testing.assert_allclose(image, expected, rtol=1e-3, atol=5e-5)
+
+
+def test_the_signals_add_up_to_the_colour():
+    (frame,) = split(9, 14, 1)
+    stencil = Stencil(9, 14, 1)
+    for names in ((), ("specular",), ("unshadowed",), ("specular", "visibility"),
+                  ("direct", "specular"), ("albedo",), ("albedo", "emission")):
+        images = {k: v for k, v in frame.images.items() if k not in names}
+        some = with_images(type(frame)(frame.index, images, frame.camera_from_world,
+                                       frame.screen_from_world, frame.world_from_object))
+        for gloss in (True, False):
+            signals = read_signals(some, read_color(some, stencil), stencil, True, gloss)
+            expected = frame["color"]
+            if "emission" in names:
+                expected = expected - frame["emission"]
+            np.testing.assert_allclose(stencil.image(signals.color(signals.parts)), expected,
+                                       rtol=1e-4, atol=1e-5)
+
+
+def test_it_follows_a_change_of_light_at_once_where_plain_accumulation_lags():
+    """A wall that turns three times as bright: the next frame's mean is the new one."""
+    wall = make_frame(32, 32, wall_end=1e9)
+
+    def lit(level, seed):
+        noise = np.random.default_rng(seed).normal(0, 0.3, (32, 32, 1))
+        return with_images(wall, color=np.full((32, 32, 3), level) + noise * level)
+
+    frames = [lit(1.0, i) for i in range(12)] + [lit(3.0, 99)]
+    method = FilteredInnovation(demodulate=False)
+    before, state = run(method, frames[:-1])
+    after, _ = method(frames[-1], state)
+    assert before[8:-8, 8:-8].mean() == pytest.approx(1, rel=0.02)
+    assert after[8:-8, 8:-8].mean() == pytest.approx(3, rel=0.03)
+
+
+def test_history_lowers_the_error_of_a_still_scene_below_that_of_single_frames():
+    truth = make_frame(32, 40)
+    frames = [noisy(truth, seed=i) for i in range(10)]
+    method = FilteredInnovation(demodulate=False)
+    error = [np.square(image - truth["color"]).mean() for image in
+             (run(method, frames[-1:])[0], run(method, frames)[0])]
+    assert error[1] < 0.7 * error[0]
+
+
+def test_energy_is_kept():
+    frames = split(33, 41, 4)
+    image, _ = run(FilteredInnovation(), frames)
+    assert image.mean() == pytest.approx(frames[-1]["color"].mean(), rel=0.01)
+
+
+def test_visibility_above_its_cap_is_not_lost():
+    (frame,) = split(24, 24, 1)
+    visibility = frame["visibility"].copy()
+    visibility[5, 5] = 50
+    burst = with_images(frame, visibility=visibility,
+                        direct=frame["unshadowed"] * visibility[..., None],
+                        color=frame["emission"] + frame["indirect"]
+                        + frame["unshadowed"] * visibility[..., None])
+    stencil = Stencil(24, 24, 1)
+    signals = read_signals(burst, read_color(burst, stencil), stencil, True, True)
+    assert stencil.image(signals.parts[-1]).max() <= 2
+    np.testing.assert_allclose(stencil.image(signals.color(signals.parts)), burst["color"],
+                               rtol=1e-4, atol=1e-5)
+
+
+def test_a_lamp_and_what_is_around_it_do_not_mix():
+    """The lamp reflects nothing; its neighbours, of the same plane, must not take its darkness."""
+    wall = make_frame(24, 24, wall_end=1e9)
+    there = (wall["id"] == 0)[..., None]
+    albedo = np.where(there, [0.5] * 3, 0.5)
+    albedo[8:16, :6] = 0
+    emission = np.where(albedo == 0, 4.0, 0.0)
+    light = np.where(albedo > 0, albedo * 2.0, 0)
+    frame = with_images(wall, albedo=albedo, emission=emission, direct=0 * light, indirect=light,
+                        color=light + emission)
+    image, _ = run(FilteredInnovation(), [frame, frame])
+    np.testing.assert_allclose(image, frame["color"], rtol=1e-4)
+
+
+def test_a_moving_object_and_its_background_keep_histories_of_their_own():
+    def painted(i):
+        frame = make_frame(24, 32, index=i, board=translation(0.2 * i, 0, 0), wall_end=1e9)
+        return with_images(frame, color=np.where((frame["id"] == 1)[..., None], [4.0] * 3, 1.0))
+
+    frames = [painted(i) for i in range(5)]
+    image, _ = run(FilteredInnovation(demodulate=False), frames)
+    np.testing.assert_allclose(image, frames[-1]["color"], rtol=2e-2)
+
+
+def test_five_frames_are_one_recording_and_parameters_compile_nothing():
+    frames = split(16, 20, 5)
+    run(FilteredInnovation(), frames)
+    other = FilteredInnovation(light_alpha=0.1, visibility_sigma=3.0, fade=3.0, sigma_plane=0.02,
+                               longest=9.0, plane_tolerance=0.03)
+    assert compiled(lambda: run(other, frames)) == 0
+    _, state = run(FilteredInnovation(), frames)
+    works = state.works
+    steps = [works.look_back, works.merge, works.pack, works.fade, works.hide,
+             *(level.step for level in (*works.smoothing, *works.levels))]
+    assert [step.recordings for step in steps] == [1] * len(steps)
+
+
+def test_two_threads_give_what_one_gives():
+    frames = split(21, 18)
+    one, two = taking_turns(lambda: run(FilteredInnovation(), frames)[0])
+    np.testing.assert_array_equal(one, two)
+
+
+def test_other_channels_halfway_are_refused():
+    frames = split(8, 8, 2)
+    method = FilteredInnovation()
+    _, state = method(frames[0], method.init(8, 8))
+    plain = type(frames[1])(1, {k: v for k, v in frames[1].images.items() if k not in USED},
+                            frames[1].camera_from_world, frames[1].screen_from_world,
+                            frames[1].world_from_object)
+    with pytest.raises(InputError, match="other channels"):
+        method(plain, state)
+
+
+@pytest.mark.parametrize("settings", [
+    {"levels": 0}, {"levels": 2.0}, {"sharp_levels": 5}, {"sharp_smoothing": 1},
+    {"light_alpha": 0.0}, {"visibility_sigma": -1.0}, {"longest": 0.0}, {"follow": 0.0},
+    {"doubt": -1.0}, {"fade": 0.0}])
+def test_bad_parameters_are_refused(settings):
+    with pytest.raises(InputError, match=next(iter(settings))):
+        FilteredInnovation(**settings)
