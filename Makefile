@@ -9,7 +9,7 @@ endif
 
 demo: .venv/installed
 	$(BIN)/onespp run box --frames 0:8 --size 192x192 --reference-spp 256 --out data/demo \
-	    --method bilateral --method atrous --method assignment --method assignment-atrous
+	    --method bilateral --method assignment --method atrous --method svgf --method onespp
 	@echo "Look at data/demo/pictures."
 
 test: .venv/installed-dev lint

@@ -141,7 +141,7 @@ def storm(command: str, whole: Whole, kills: list[tuple[str, float]], folder: Pa
         check_intact(folder, whole.after[command])
         late = over and code <= 0
         hits += not late
-        seconds *= 0.7 if late else 1.1
+        seconds *= 0.5 if late else 1.2
         if late:  # it was done before
             shutil.rmtree(folder)
             shutil.copytree(whole.before[command], folder)
@@ -168,4 +168,4 @@ def test_fifty_kills_at_random_moments(tmp_path, command):
     signals = ("SIGINT", "SIGTERM", "SIGKILL", "SIGINT2", "SIGKILL") * 10
     hits = storm(command, whole, [(how, rng.random()) for how in signals], tmp_path / "storm/s")
     print(f"{command}: 50 kills, {hits} of them at work")
-    assert hits > 15
+    assert hits > 15  # the others came when the work was done
