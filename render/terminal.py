@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import NoReturn
 
 import click
 from rich.console import Console
@@ -139,6 +140,9 @@ def run(command: click.Command, arguments: Sequence[str] | None = None,
             raise
         where = f" at {error.filename}" if error.filename else ""
         _stop(_REASONS[error.errno].format(where=where))
+    finally:  # Python is about to end, and an interrupt would only make it complain
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
 
 
 def readable(typed: str) -> str:
@@ -165,12 +169,13 @@ _REASONS = {
 }
 
 
-def _interrupted() -> None:
+def _interrupted() -> NoReturn:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     click.echo("onespp: stopped; what was finished is kept, and the same command goes on "
                "from there", err=True)
     sys.exit(INTERRUPTED)
 
 
-def _stop(sentence: str) -> None:
+def _stop(sentence: str) -> NoReturn:
     click.echo(f"onespp: {sentence}", err=True)
     sys.exit(BAD_INPUT)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 
@@ -31,6 +32,9 @@ def call(capsys):
             render.terminal.run(onespp.app, [str(a) for a in arguments])
         except SystemExit as stop:
             code = int(stop.code or 0)
+        finally:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
         captured = capsys.readouterr()
         return code, captured.out, captured.err
     return run
