@@ -30,7 +30,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals are POS
 # Partial references are saved after every pass here, so that kills meet them.
 PROGRAM = "import render.job; render.job.SECONDS_BETWEEN_SAVES = 0; import onespp; onespp.main()"
 COMMANDS = {
-    "render": ("render", "{scene}", "--frames", "0:8", "--size", "64x48", "--reference-spp", "64",
+    "render": ("render", "{scene}", "--frames", "0:8", "--size", "64x48", "--reference-spp", "16",
                "--out", "{out}"),
     "denoise": ("denoise", "{out}", "--method", "atrous"),
     "score": ("score", "{out}"),
