@@ -27,16 +27,15 @@ import drjit as dr
 import numpy as np
 
 from render.channels import REPLAY
-from render.errors import InputError
 from render.frame import Frame
 
 from .atrous import LARGEST_LEVELS, SPLINE
+from .history import RecordState
 from .lanes import OnLanes
-from .parameters import check_positive, check_range
-from .stencil import Float, Planes, Stencil, Step, Taps
+from .parameters import check_positive, check_range, check_whole
+from .stencil import Float, Planes, Stencil, Step, Taps, window
 from .surface import Surface
-from .svgf import Svgf, SvgfState
-from .wavelet import WINDOW_5x5
+from .svgf import Svgf
 
 STRATUM = 3          # pixels, side
 _LEAST = 1e-6        # radiance; darker samples say nothing
@@ -64,10 +63,7 @@ class Asvgf(Svgf):
         super().__post_init__()
         check_range(self, "alpha_indirect", 1e-6, 1.0)
         check_positive(self, "gradient_scale")
-        levels = self.gradient_levels
-        if not isinstance(levels, int) or not 1 <= levels <= LARGEST_LEVELS:
-            raise InputError(f"gradient_levels is {levels}: "
-                             f"use a whole number from 1 to {LARGEST_LEVELS}")
+        check_whole(self, "gradient_levels", LARGEST_LEVELS)
 
     def init_on(self, stencil: Stencil) -> AsvgfState:
         plain = super().init_on(stencil)
@@ -86,8 +82,8 @@ class Asvgf(Svgf):
 
 
 @dataclass(frozen=True)
-class AsvgfState(SvgfState):
-    """`SvgfState`, and what filters gradients."""
+class AsvgfState(RecordState):
+    """`RecordState`, and what filters gradients."""
 
     gradients: Any = None
 
@@ -108,7 +104,7 @@ class Gradients:
         height, width = (-(-size // STRATUM) for size in (stencil.height, stencil.width))
         strata = Stencil(height, width, 2 << (levels - 1))
         planes = strata.planes([0.0] * 4)
-        taps = [planes.taps([(dy << i, dx << i) for dy, dx in WINDOW_5x5]) for i in range(levels)]
+        taps = [planes.taps([(dy << i, dx << i) for dy, dx in window(2)]) for i in range(levels)]
 
         def spread(sums: list[Float], scale: list[Float]) -> list[Float]:
             return spread_strata(stencil, strata, sums, scale)
@@ -148,7 +144,7 @@ def gather_strata(now: np.ndarray, before: np.ndarray, count: int) -> np.ndarray
 def blur(taps: Taps, center: list[Float]) -> list[Float]:
     """One level of F."""
     sums: Sequence[Float] = [c * SPLINE[0]**2 for c in center]
-    for i, (dy, dx) in enumerate(WINDOW_5x5):
+    for i, (dy, dx) in enumerate(window(2)):
         h = SPLINE[abs(dy)] * SPLINE[abs(dx)]
         sums = [dr.fma(tap, h, s) for tap, s in zip(taps.at(i), sums)]
         taps.next()

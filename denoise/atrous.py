@@ -35,14 +35,13 @@ from typing import Any
 
 import drjit as dr
 
-from render.errors import InputError
 from render.frame import Frame
 
 from .demodulation import read_texture
 from .exponential import exp2
 from .lanes import OnLanes
-from .parameters import check_positive
-from .stencil import Float, Stencil, Step, Taps
+from .parameters import check_positive, check_whole
+from .stencil import Float, Stencil, Step, Taps, window
 from .surface import LUMINANCE, Surface, luminance
 
 LOG2E = 1.4426950408889634
@@ -54,11 +53,6 @@ EPSILON = 1e-6       # radiance; below it differences of luminance do not count
 BACKGROUND = -1e8    # 1/z where there is no surface: far from any plane, so that its weight is 0
 _OUTSIDE = -1e15     # 1/z outside the image
 _BACKGROUND_SCALE = 1e3  # |k| / sigma_plane of background, whose like alone count
-
-
-def _window(radius: int) -> list[tuple[int, int]]:
-    side = range(-radius, radius + 1)
-    return [(dy, dx) for dy in side for dx in side if (dy, dx) != (0, 0)]
 
 
 @dataclass(frozen=True)
@@ -79,9 +73,7 @@ class Atrous(OnLanes):
     demodulate: bool = True
 
     def __post_init__(self) -> None:
-        if not isinstance(self.levels, int) or not 1 <= self.levels <= LARGEST_LEVELS:
-            raise InputError(f"levels is {self.levels}: "
-                             f"use a whole number from 1 to {LARGEST_LEVELS}")
+        check_whole(self, "levels", LARGEST_LEVELS)
         check_positive(self, "sigma_luminance", "sigma_plane", "normal_power")
 
     @property
@@ -92,10 +84,10 @@ class Atrous(OnLanes):
         signal, guides = stencil.planes([0.0] * 4), stencil.planes([0.0] * 3 + [_OUTSIDE])
         level_taps = []
         for i in range(self.levels):
-            offsets = [(dy << i, dx << i) for dy, dx in (*_window(2), (0, 0))]
+            offsets = [(dy << i, dx << i) for dy, dx in (*window(2), (0, 0))]
             level_taps.append((signal.taps(offsets), guides.taps(offsets)))
-        near = [*_window(VARIANCE_RADIUS), (0, 0)]
-        return AtrousState(stencil, signal, guides, level_taps, signal.taps(_window(1)),
+        near = [*window(VARIANCE_RADIUS), (0, 0)]
+        return AtrousState(stencil, signal, guides, level_taps, signal.taps(window(1)),
                            (signal.taps(near), guides.taps(near)),
                            [stencil.opaque(1 << i) for i in range(self.levels)],
                            Step(estimate_variance), [Step(level) for _ in range(self.levels)])
@@ -152,7 +144,7 @@ def estimate_variance(signal: Taps, guides: Taps, plane: list[Float]) -> Float:
     lum, inverse_depth, limit = signal.at(-1)[1], guides.at(-1)[3], 1 / scale
     float_t = type(lum)
     count, sum1, sum2, row = float_t(1), float_t(0), float_t(0), inverse_depth
-    for i, (dy, dx) in enumerate(_window(VARIANCE_RADIUS)):
+    for i, (dy, dx) in enumerate(window(VARIANCE_RADIUS)):
         if dx == -VARIANCE_RADIUS:
             row = dr.fma(gy, float(dy), inverse_depth)
         distance = dr.abs(guides.at(i)[3] - dr.fma(gx, float(dx), row))
@@ -170,7 +162,7 @@ def luminance_scale(taps: Taps, variance: list[Float], numbers: list[Float]) -> 
     """log2(e) / (sigma_luminance sqrt(g3x3(v)) + eps)."""
     epsilon, sigma, *_ = numbers
     blurred = variance[0] * BINOMIAL[0]**2
-    for i, (dy, dx) in enumerate(_window(1)):
+    for i, (dy, dx) in enumerate(window(1)):
         blurred = dr.fma(taps.at(i)[3], BINOMIAL[abs(dy)] * BINOMIAL[abs(dx)], blurred)
     return 1 / dr.fma(sigma, dr.sqrt(blurred), epsilon)
 
@@ -204,7 +196,7 @@ def filter_level(signal: Taps, guides: Taps, plane: list[Float], scale_of_l: Flo
     total = type(lum)(h0)
     r, y, b, v = red * h0, lum * h0, blue * h0, variance * h0**2
     row = inverse_depth
-    for i, (dy, dx) in enumerate(_window(2)):
+    for i, (dy, dx) in enumerate(window(2)):
         tr, ty, tb, tv = signal.at(i)
         tnx, tny, tnz, tap_inverse_depth = guides.at(i)
         if dx == -2:

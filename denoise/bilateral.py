@@ -28,7 +28,7 @@ from render.frame import Frame
 from .demodulation import read_texture
 from .exponential import exp2
 from .lanes import OnLanes
-from .parameters import check_positive, check_radius
+from .parameters import check_positive, check_whole
 from .stencil import Float, Planes, Stencil, Step, Taps
 from .surface import Surface
 
@@ -63,7 +63,7 @@ class Bilateral(OnLanes):
     isolate_background: bool = True
 
     def __post_init__(self) -> None:
-        check_radius(self, "radius")
+        check_whole(self, "radius", 64)
         check_positive(self, "sigma_coord", "sigma_color", "sigma_normal", "sigma_plane")
 
     @property

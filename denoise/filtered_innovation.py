@@ -11,20 +11,17 @@ Parameters were found by measurement: see `tune.py`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import drjit as dr
 
-from render.errors import InputError
 from render.frame import Frame
 
 from .atrous import BACKGROUND, LARGEST_LEVELS, LOG2E
-from .history import no_history, pack_records
+from .history import RecordState, no_history, pack_records
 from .innovation import (
-    CENTER,
     ENERGY_LEVELS,
-    WINDOW,
     fade_out,
     guided_level,
     look_back,
@@ -32,11 +29,11 @@ from .innovation import (
     smooth_level,
 )
 from .lanes import OnLanes
-from .parameters import check_positive, check_range
-from .reprojection import check_motion, load_table, motion_table
+from .parameters import check_positive, check_range, check_whole
+from .reprojection import motion_between, without_images
 from .signals import USED, Signals, check_signals, read_signals
-from .stencil import Float, Planes, Stencil, Step, Taps
-from .surface import Surface, camera_from_screen
+from .stencil import Float, Planes, Stencil, Step, Taps, window
+from .surface import Surface
 
 _OUTSIDE = -1e15          # 1/z outside the image
 _UNSEEN = -3e14           # 1/z of a pixel without history
@@ -86,13 +83,8 @@ class FilteredInnovation(OnLanes):
 
     def __post_init__(self) -> None:
         for name, least in (("smoothing", ENERGY_LEVELS), ("levels", 1)):
-            most = LARGEST_LEVELS
-            for key in (name, f"sharp_{name}"):
-                levels = getattr(self, key)
-                if not isinstance(levels, int) or not least <= levels <= most:
-                    raise InputError(f"{key} is {levels}: "
-                                     f"use a whole number from {least} to {most}")
-                most = levels  # the sharp signals' are not more
+            check_whole(self, name, LARGEST_LEVELS, least)
+            check_whole(self, f"sharp_{name}", getattr(self, name), least)
         for name in ("light_alpha", "visibility_alpha", "follow"):
             check_range(self, name, 1e-6, 1.0)
         check_range(self, "doubt", 0.0, 1e6)
@@ -105,14 +97,14 @@ class FilteredInnovation(OnLanes):
     def reach(self) -> int:
         return 1 << (max(self.smoothing, self.levels) - 1)
 
-    def init_on(self, stencil: Stencil) -> InnovationState:
-        return InnovationState(stencil, no_history(stencil))
+    def init_on(self, stencil: Stencil) -> RecordState:
+        return RecordState(stencil, no_history(stencil))
 
     def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
-                 state: InnovationState) -> tuple[list[Float], InnovationState]:
+                 state: RecordState) -> tuple[list[Float], RecordState]:
         """`color` is used where the frame has no direct and indirect light."""
-        stencil, previous = state.stencil, state.previous or frame
-        check_motion(previous, frame)
+        stencil = state.stencil
+        table, dual = motion_between(state.previous or frame, frame, stencil)
         signals = read_signals(frame, color, stencil, self.demodulate, self.gloss)
         works = state.works or Works.make(self, stencil, signals.sizes)
         check_signals(frame, works.sizes, signals.sizes)
@@ -122,8 +114,6 @@ class FilteredInnovation(OnLanes):
         dr.eval(signal, near, inverse_depth, plane)
         works.depths.store([inverse_depth])
 
-        table = load_table(motion_table(previous, frame), stencil)
-        dual = [stencil.opaque(x) for x in camera_from_screen(previous).T.ravel()]
         limits = [stencil.opaque(x) for x in (self.min_cosine, self.plane_tolerance, self.longest)]
         innovation, energies, carried = works.look_back(signal, near, [table], dual,
                                                         [state.records], limits)
@@ -141,9 +131,8 @@ class FilteredInnovation(OnLanes):
         values = _interleave(works.sizes, histories, noises)
         parts = works.filter(values, plane, [fade], sigmas)
         records = works.pack(near, carried[:1], values)
-        seen = Frame(frame.index, {"id": frame["id"]}, frame.camera_from_world,
-                     frame.screen_from_world, frame.world_from_object)
-        return signals.color(parts), replace(state, works=works, records=records, previous=seen)
+        return signals.color(parts), replace(state, works=works, records=records,
+                                            previous=without_images(frame))
 
     def _guides(self, surface: Surface, signals: Signals,
                 stencil: Stencil) -> tuple[Float, list[Float]]:
@@ -159,16 +148,6 @@ class FilteredInnovation(OnLanes):
 
 
 @dataclass(frozen=True)
-class InnovationState:
-    """Records of the previous frame and its matrices; planes and steps once they are made."""
-
-    stencil: Stencil
-    records: Float = field(repr=False)
-    previous: Frame | None = None
-    works: Works | None = None
-
-
-@dataclass(frozen=True)
 class Level:
     """A pass over the first planes: taps of values and of 1/z, and the recorded step."""
 
@@ -179,7 +158,7 @@ class Level:
     @staticmethod
     def make(i: int, values: Planes, count: int, depths: Planes,
              function: Callable[..., list[Float]]) -> Level:
-        offsets = [(dy << i, dx << i) for dy, dx in (*WINDOW, CENTER)]
+        offsets = [(dy << i, dx << i) for dy, dx in (*window(1), (0, 0))]
         return Level((values.taps(offsets, count), depths.taps(offsets)),
                      values.stencil.opaque(1 << i), Step(function))
 

@@ -12,21 +12,22 @@ Departure from SVGF: it tests the difference of depths, this the distance from t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import drjit as dr
 
-from .reprojection import LEAST_WEIGHT
+from render.frame import Frame
+
+from .reprojection import LEAST_WEIGHT, Place
 from .sparse import weighted_sums
 from .stencil import Float, Stencil
-from .surface import dot, transform
+from .surface import dot
 
 WORDS = 16          # floats in a record, one cache line
 MOST_VALUES = 12
 _HEAD = WORDS - MOST_VALUES
 _CHUNK = 8          # floats that one gather brings, at most
-_ROW = 32           # floats an object in the motion table
 _NOBODY = -2.0      # ID of an empty record
 
 
@@ -42,55 +43,17 @@ def pack_records(stencil: Stencil, surface: list[Float], values: Sequence[Float]
     id_, nx, ny, nz, depth = surface
     words = [stencil.Float(id_) + dr.select(nz < 0, stencil.Float(0.5), 0), nx, ny, depth, *values]
     words += [stencil.Float(0)] * (WORDS - len(words))
-    packed = dr.empty(stencil.Float, stencil.lanes * WORDS)
-    dr.scatter(packed, stencil.ArrayXf(words), dr.arange(stencil.UInt, stencil.lanes))
-    return packed
+    return stencil.pack(words)
 
 
 @dataclass(frozen=True)
-class Place:
-    """Where each pixel's surface was: what a record must agree with.
+class RecordState:
+    """A method's records of the previous frame and its matrices, and what it works with."""
 
-    Attributes:
-        x, y: screen position in the previous frame. inside: whether it is on that screen.
-        id: object ID. normal: expected there. smooth: whether there is a normal.
-        plane, offset, nearness: a record at u' with depth z' is near the expected tangent plane
-            if |z' plane . u' - offset| < nearness.
-    """
-
-    x: Float
-    y: Float
-    inside: Any
-    id: Float
-    normal: list[Float]
-    smooth: Any
-    plane: list[Float]
-    offset: Float
-    nearness: Float
-
-
-def locate(stencil: Stencil, surface: list[Float], table: Float, dual: list[Float],
-           plane_tolerance: Float) -> Place:
-    """Args as for `reprojection.reproject`."""
-    float_t = stencil.Float
-    id_, *normal, depth = surface
-    known = (id_ >= 0) & (id_ < dr.width(table) // _ROW)
-    quad = stencil.UInt(dr.select(known, id_, 0)) * (_ROW // 4)
-    rows = [dr.gather(stencil.Array4f, table, quad + r) for r in range(6)]
-    row, column = stencil.pixel()
-    u = [float_t(column) + 0.5, float_t(row) + 0.5, float_t(1)]
-    d = [dr.fma(e.w, 1 / depth, dot([e.x, e.y, e.z], u)) for e in rows[:3]]
-    scale = 1 + d[2]
-    x = u[0] + (d[0] - u[0] * d[2]) / scale
-    y = u[1] + (d[1] - u[1] * d[2]) / scale
-    inside = (known & (scale > 1e-6) & (x >= 0) & (x < stencil.width)
-              & (y >= 0) & (y < stencil.height))
-    x, y = dr.select(inside, x, 0.5), dr.select(inside, y, 0.5)
-    expected = transform([[r.x, r.y, r.z] for r in rows[3:]], normal)
-    plane = transform([dual[:3], dual[3:6], dual[6:]], expected)
-    depth = depth * scale
-    return Place(x, y, inside, float_t(id_), expected, dot(normal, normal) > 0.25, plane,
-                 depth * dot(plane, [x, y, float_t(1)]), plane_tolerance * depth)
+    stencil: Stencil
+    records: Float = field(repr=False)
+    previous: Frame | None = None
+    works: Any = None
 
 
 def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosine: Float,
@@ -115,7 +78,7 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
         center = [float_t(column) + 0.5, float_t(row) + 0.5, float_t(1)]
         near = dr.abs(dr.fma(depth, dot(place.plane, center), -place.offset)) < place.nearness
         turned = dot(place.normal, normal) > min_cosine
-        passes = on_screen & (id_ == place.id) & (~place.smooth | (near & turned))
+        passes = on_screen & (id_ == place.id) & (place.rough | (near & turned))
         return words[_HEAD:], passes
 
     left, top = dr.floor(place.x - 0.5), dr.floor(place.y - 0.5)

@@ -44,13 +44,12 @@ import drjit as dr
 
 from .atrous import EPSILON, LOG2E
 from .exponential import exp2
-from .history import locate, look_up
+from .history import look_up
+from .reprojection import locate
 from .sparse import weighted_sums
-from .stencil import Float, Offset, Stencil, Taps
+from .stencil import Float, Offset, Stencil, Taps, window
 
 BINOMIAL = {0: 1 / 2, 1: 1 / 4}
-WINDOW: list[Offset] = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx]
-CENTER: Offset = (0, 0)
 ENERGY_LEVELS = 2
 LEAST_NOISE = 0.25    # share of the innovation's energy that is at least noise of d
 RADIUS = 2            # pixels, of the window of the spatial variance
@@ -108,7 +107,7 @@ def smooth_level(values: Taps, depths: Taps, plane: list[Float],
     center = values.at(-1)
     total, sums = type(plane[0])(h0), [v * h0 for v in center[1:]]
     variance = center[0] * h0**2
-    for i, offset in enumerate(WINDOW):
+    for i, offset in enumerate(window(1)):
         w = exp2(exponent(i, offset))
         tap = values.at(i)
         sums = [dr.fma(w, v, s) for v, s in zip(tap[1:], sums)]
@@ -176,8 +175,7 @@ def spatial_variances(stencil: Stencil, sizes: tuple[int, ...], signal: list[Flo
     lum = [signal[start + luma(size)] for start, size in zip(starts, sizes)]
     inverse_depth, gx, gy, scale = guides
     words = [*lum, *(stencil.Float(0) for _ in range(_ENTRY - 1 - len(lum))), inverse_depth]
-    table = dr.empty(stencil.Float, stencil.lanes * _ENTRY)
-    dr.scatter(table, stencil.ArrayXf(words), dr.arange(stencil.UInt, stencil.lanes))
+    table = stencil.pack(words)
     dr.eval(table)
     row, column = (stencil.Int(i) for i in stencil.pixel())
     side = 2 * RADIUS + 1
@@ -219,7 +217,7 @@ def guided_level(sizes: tuple[int, ...], fading: tuple[bool, ...], values: Taps,
     scales = [sigma / (dr.sqrt(center[start + size]) + EPSILON)
               for start, size, sigma in zip(starts, sizes, sigmas)]
     totals = [type(plane[0])(h0) for _ in sizes]
-    for i, offset in enumerate(WINDOW):
+    for i, offset in enumerate(window(1)):
         tap, e = values.at(i), exponent(i, offset)
         for s, (start, size) in enumerate(zip(starts, sizes)):
             at = start + luma(size)

@@ -22,7 +22,8 @@ from typing import Any
 import drjit as dr
 
 from .exponential import exp2
-from .history import locate, look_up
+from .history import look_up
+from .reprojection import locate
 from .sparse import weighted_sums
 from .stencil import Float, Stencil
 from .wavelet import geometry_exponent
@@ -75,10 +76,7 @@ def accumulate(stencil: Stencil, fallback: bool, signal: list[Float], surface: l
 def tabulate(stencil: Stencil, moments: list[Float], guides: list[Float]) -> Float:
     """The table that `estimate_variances` looks its window up in."""
     words = [*moments, *guides[:4]]
-    words += [stencil.Float(0)] * (_ENTRY - len(words))
-    table = dr.empty(stencil.Float, stencil.lanes * _ENTRY)
-    dr.scatter(table, stencil.ArrayXf(words), dr.arange(stencil.UInt, stencil.lanes))
-    return table
+    return stencil.pack([*words, *[stencil.Float(0)] * (_ENTRY - len(words))])
 
 
 def estimate_variances(stencil: Stencil, moments: list[Float], lengths: list[Float],

@@ -13,7 +13,7 @@ copy of the inputs and the filter.
 from __future__ import annotations
 
 import importlib.util
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -155,20 +155,15 @@ class TemporalOidn:
                  ) -> tuple[np.ndarray, tuple[TemporalState, OidnState]]:
         emission = emission_of(frame) if self.oidn.emission_apart else np.zeros(1, np.float32)
         images = {k: v for k, v in frame.images.items() if k != "emission"}
-        light = _with_color(frame, images, frame["color"] - emission)
+        light = replace(frame, images={**images, "color": frame["color"] - emission})
         color, history = self.temporal(light, state[0])
-        image, network = self.oidn(_with_color(frame, images, color), state[1])
+        image, network = self.oidn(replace(frame, images={**images, "color": color}), state[1])
         return image + emission, (history, network)
 
 
 def emission_of(frame: Frame) -> np.ndarray:
     """(h, w, 3) emission, or 0 where the frame has none or it is not finite."""
     return _finite(frame["emission"], 0.0) if "emission" in frame else np.zeros(1, np.float32)
-
-
-def _with_color(frame: Frame, images: dict[str, np.ndarray], color: np.ndarray) -> Frame:
-    return Frame(frame.index, {**images, "color": color}, frame.camera_from_world,
-                 frame.screen_from_world, frame.world_from_object)
 
 
 def _finite(image: np.ndarray, otherwise: float) -> np.ndarray:

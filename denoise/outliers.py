@@ -29,8 +29,8 @@ import numpy as np
 from render.frame import Frame
 
 from .demodulation import Texture, read_texture
-from .parameters import check_positive, check_radius
-from .stencil import Float, Offset, Planes, Stencil, Step, Taps
+from .parameters import check_positive, check_whole
+from .stencil import Float, Offset, Planes, Stencil, Step, Taps, window
 from .surface import GUIDES, check_size, read_surface, repair
 
 FEWEST = 4
@@ -52,20 +52,15 @@ class RemoveOutliers:
 
     def __post_init__(self) -> None:
         check_positive(self, "outlier_width", "outlier_plane")
-        check_radius(self, "outlier_radius", largest=8)
+        check_whole(self, "outlier_radius", 8)
 
     def init(self, height: int, width: int) -> OutlierState:
         """State before the first frame; InputError for an empty image."""
         stencil = Stencil(height, width, self.outlier_radius)
         signal, guides = stencil.planes([0.0] * 3), stencil.planes([-2.0, 0.0])
-        window = self.window
-        return OutlierState(stencil, signal, guides, signal.taps(window), guides.taps(window),
-                            Step(lambda *a: clamp(window, *a)))
-
-    @property
-    def window(self) -> list[Offset]:
-        side = range(-self.outlier_radius, self.outlier_radius + 1)
-        return [(dy, dx) for dy in side for dx in side if dy or dx]
+        offsets = window(self.outlier_radius)
+        return OutlierState(stencil, signal, guides, signal.taps(offsets), guides.taps(offsets),
+                            Step(lambda *a: clamp(offsets, *a)))
 
     def __call__(self, frame: Frame, state: OutlierState) -> tuple[Frame, OutlierState]:
         """The frame with its colour (and parts) cleaned, and the state for the next one.
@@ -96,9 +91,7 @@ class RemoveOutliers:
         images["color"] = color
         after = replace(state, before=state.before + float(before.mean(dtype=np.float64)),
                         after=state.after + float(color.mean(dtype=np.float64)))
-        cleaned = Frame(frame.index, {**frame.images, **images}, frame.camera_from_world,
-                        frame.screen_from_world, frame.world_from_object)
-        return cleaned, after
+        return replace(frame, images={**frame.images, **images}), after
 
 
 @dataclass(frozen=True)
@@ -132,13 +125,13 @@ def _lights(frame: Frame, color: np.ndarray,
     yield "indirect", parts["indirect"], plain
 
 
-def clamp(window: list[Offset], signal: Taps, guides: Taps, center: list[Float],
+def clamp(offsets: list[Offset], signal: Taps, guides: Taps, center: list[Float],
           center_guides: list[Float], width: list[Float]) -> list[Float]:
     """Each channel within mu -+ k sigma of the window's pixels on the same surface."""
     id_, inverse_depth, gx, gy, scale = center_guides
     float_t = type(inverse_depth)
     count, sums, squares = float_t(0), [float_t(0)] * 3, [float_t(0)] * 3
-    for i, (dy, dx) in enumerate(window):
+    for i, (dy, dx) in enumerate(offsets):
         tap_id, tap_inverse_depth = guides.at(i)
         expected = dr.fma(gx, float(dx), dr.fma(gy, float(dy), inverse_depth))
         alike = (tap_id == id_) & (dr.abs(tap_inverse_depth - expected) * scale < 1)

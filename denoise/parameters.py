@@ -24,11 +24,11 @@ def check_range(denoiser: Any, name: str, low: float, high: float) -> None:
         raise InputError(f"{name} is {value}: use {low:g} to {high:g}")
 
 
-def check_radius(denoiser: Any, name: str, largest: int = 64) -> None:
-    """InputError unless the field is a whole number of pixels from 1 to `largest`."""
+def check_whole(denoiser: Any, name: str, most: int, least: int = 1) -> None:
+    """InputError unless the field is a whole number from `least` to `most`."""
     value = getattr(denoiser, name)
-    if not isinstance(value, int) or not 1 <= value <= largest:
-        raise InputError(f"{name} is {value}: use a whole number from 1 to {largest}")
+    if not isinstance(value, int) or not least <= value <= most:
+        raise InputError(f"{name} is {value}: use a whole number from {least} to {most}")
 
 
 def check_choice(denoiser: Any, name: str, choices: tuple[str, ...]) -> None:

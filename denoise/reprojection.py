@@ -23,7 +23,7 @@ Departure from the assignment: it takes the one nearest pixel and tests the obje
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -111,26 +111,57 @@ def load_table(table: np.ndarray, stencil: Stencil) -> Float:
     return stencil.table(padded)
 
 
+def motion_between(previous: Frame, current: Frame,
+                   stencil: Stencil) -> tuple[Float, list[Float]]:
+    """The motion table on the device, and B'^T, nine numbers row by row: what `locate` asks for.
+
+    Raises:
+        InputError: the frames cannot follow one another, or their matrices do not project.
+    """
+    if len(previous.world_from_object) != len(current.world_from_object):
+        raise InputError(
+            f"frame {current.index} has {len(current.world_from_object)} objects, the frame "
+            f"before it {len(previous.world_from_object)}: they are not of one sequence")
+    return (load_table(motion_table(previous, current), stencil),
+            [stencil.opaque(x) for x in camera_from_screen(previous).T.ravel()])
+
+
+def without_images(frame: Frame) -> Frame:
+    """What the next frame must know of one: its matrices."""
+    return replace(frame, images={"id": frame["id"]})
+
+
 def pack(stencil: Stencil, color: list[Float], surface: list[Float]) -> Float:
     """History of a frame: 8 words a lane, colour, ID, normal, depth."""
     id_, nx, ny, nz, depth = surface
-    packed = dr.empty(stencil.Float, stencil.lanes * WORDS)
-    words = stencil.ArrayXf([*color, stencil.Float(id_), nx, ny, nz, depth])
-    dr.scatter(packed, words, dr.arange(stencil.UInt, stencil.lanes))
-    return packed
+    return stencil.pack([*color, stencil.Float(id_), nx, ny, nz, depth])
 
 
-def reproject(stencil: Stencil, surface: list[Float], table: Float, dual: list[Float],
-              history: Float, tests: Tests, limits: list[Float]) -> tuple[list[Float], Any]:
-    """Colour of the previous frame where each pixel's surface was.
+@dataclass(frozen=True)
+class Place:
+    """Where each pixel's surface was: what a pixel of the previous frame must agree with.
 
-    Args:
-        surface: ID, normal (3), depth of the current frame. table: `load_table`.
-        dual: B'^T, nine numbers, row by row. history: `pack` of the previous frame.
-        tests: `tests.nearest` alone is read; limits: min_cosine, plane_tolerance.
-    Returns:
-        three arrays, and the mask of pixels that have a history.
+    Attributes:
+        x, y: screen position in the previous frame. inside: whether it is on that screen.
+        id: object ID. normal: expected there. rough: whether there is no normal.
+        plane, offset, nearness: a pixel at u' with depth z' is near the expected tangent plane
+            if |z' plane . u' - offset| < nearness.
     """
+
+    x: Float
+    y: Float
+    inside: Any
+    id: Float
+    normal: list[Float]
+    rough: Any
+    plane: list[Float]
+    offset: Float
+    nearness: Float
+
+
+def locate(stencil: Stencil, surface: list[Float], table: Float, dual: list[Float],
+           plane_tolerance: Float) -> Place:
+    """Follow each surface back; surface: ID, normal (3), depth. Others as of `motion_between`."""
     float_t = stencil.Float
     id_, *normal, depth = surface
     known = (id_ >= 0) & (id_ < dr.width(table) // _ROW)
@@ -145,38 +176,50 @@ def reproject(stencil: Stencil, surface: list[Float], table: Float, dual: list[F
     inside = (known & (scale > 1e-6) & (x >= 0) & (x < stencil.width)
               & (y >= 0) & (y < stencil.height))
     x, y = dr.select(inside, x, 0.5), dr.select(inside, y, 0.5)
+    expected = transform(rotation, normal)
+    plane = transform([dual[:3], dual[3:6], dual[6:]], expected)  # n' . X' = z' plane . u'
+    depth = depth * scale
+    return Place(x, y, inside, float_t(id_), expected, dot(normal, normal) <= 0.25, plane,
+                 depth * dot(plane, [x, y, float_t(1)]), plane_tolerance * depth)
+
+
+def reproject(stencil: Stencil, surface: list[Float], table: Float, dual: list[Float],
+              history: Float, tests: Tests, limits: list[Float]) -> tuple[list[Float], Any]:
+    """Colour of the previous frame where each pixel's surface was.
+
+    Args:
+        surface: ID, normal (3), depth of the current frame. table, dual: `motion_between`.
+        history: `pack` of the previous frame.
+        tests: `tests.nearest` alone is read; limits: min_cosine, plane_tolerance.
+    Returns:
+        three arrays, and the mask of pixels that have a history.
+    """
+    at = locate(stencil, surface, table, dual, limits[1])
 
     def tap(lane: Any) -> list[Float]:
         words = dr.gather(stencil.ArrayXf, history, lane, shape=(WORDS, stencil.lanes))
         return [words[i] for i in range(WORDS)]
 
-    id_ = float_t(id_)
     if tests.nearest:
-        words = tap(stencil.UInt(y) * stencil.stride + stencil.UInt(x))
-        return words[:3], inside & (words[3] == id_)
+        words = tap(stencil.UInt(at.y) * stencil.stride + stencil.UInt(at.x))
+        return words[:3], at.inside & (words[3] == at.id)
 
-    expected = transform(rotation, normal)
-    plane = transform([dual[:3], dual[3:6], dual[6:]], expected)  # n' . X' = z' plane . u'
-    depth = depth * scale
-    offset = depth * dot(plane, [x, y, float_t(1)])
-    nearness = limits[1] * depth
-    rough = dot(normal, normal) <= 0.25
-    left, top = dr.floor(x - 0.5), dr.floor(y - 0.5)
-    columns, x_weights = _pair(left, x - 0.5 - left, stencil.width)
-    rows, y_weights = _pair(top, y - 0.5 - top, stencil.height)
-    at_corner = dot(plane, [left + 0.5, top + 0.5, float_t(1)])
-    sums, total = [float_t(0)] * 3, float_t(0)
+    left, top = dr.floor(at.x - 0.5), dr.floor(at.y - 0.5)
+    columns, x_weights = _pair(left, at.x - 0.5 - left, stencil.width)
+    rows, y_weights = _pair(top, at.y - 0.5 - top, stencil.height)
+    at_corner = dot(at.plane, [left + 0.5, top + 0.5, stencil.Float(1)])
+    sums, total = [stencil.Float(0)] * 3, stencil.Float(0)
     for i in (0, 1):
         for j in (0, 1):
             words = tap(stencil.UInt(rows[i]) * stencil.stride + stencil.UInt(columns[j]))
-            at_tap = at_corner + (plane[0] * j + plane[1] * i)
-            near = dr.abs(dr.fma(words[7], at_tap, -offset)) < nearness
-            turned = dot(expected, words[4:7]) > limits[0]
-            passes = (words[3] == id_) & (rough | (near & turned))
+            at_tap = at_corner + (at.plane[0] * j + at.plane[1] * i)
+            near = dr.abs(dr.fma(words[7], at_tap, -at.offset)) < at.nearness
+            turned = dot(at.normal, words[4:7]) > limits[0]
+            passes = (words[3] == at.id) & (at.rough | (near & turned))
             weight = dr.select(passes, x_weights[j] * y_weights[i], 0)
             sums = [dr.fma(weight, c, s) for c, s in zip(words, sums)]
             total += weight
-    valid = inside & (total >= LEAST_WEIGHT)
+    valid = at.inside & (total >= LEAST_WEIGHT)
     scale = 1 / dr.select(valid, total, 1)
     return [s * scale for s in sums], valid
 
@@ -197,11 +240,3 @@ def _pair(first: Float, fraction: Float, size: int) -> tuple[list[Float], list[F
     last = float(size - 1)
     return ([dr.select(first > 0, first, 0), dr.select(first < last, first + 1, last)],
             [dr.select(first >= 0, 1 - fraction, 0), dr.select(first < last, fraction, 0)])
-
-
-def check_motion(previous: Frame, current: Frame) -> None:
-    """InputError where two frames cannot follow one another."""
-    if len(previous.world_from_object) != len(current.world_from_object):
-        raise InputError(
-            f"frame {current.index} has {len(current.world_from_object)} objects, the frame "
-            f"before it {len(previous.world_from_object)}: they are not of one sequence")

@@ -40,6 +40,12 @@ _SHIFT = 7  # floats from a cache line to the first pixel: no filter has taps 7 
 _SETS = 64  # sets of a first-level cache: lines that far apart displace each other
 
 
+def window(radius: int) -> list[Offset]:
+    """Offsets of the pixels around one, row by row, without it."""
+    side = range(-radius, radius + 1)
+    return [(dy, dx) for dy in side for dx in side if dy or dx]
+
+
 def _round_up(n: int, multiple: int) -> int:
     return -(-n // multiple) * multiple
 
@@ -136,6 +142,12 @@ class Stencil:
         start = -memory.ctypes.data % (4 * _LINE) // 4
         memory[start:start + values.size] = values.ravel()
         return self.Float(memory[start:start + values.size])
+
+    def pack(self, words: Sequence[Float]) -> Float:
+        """A few numbers a lane, side by side, for packed gathers. Traced, not evaluated."""
+        packed = dr.empty(self.Float, self.lanes * len(words))
+        dr.scatter(packed, self.ArrayXf(words), dr.arange(self.UInt, self.lanes))
+        return packed
 
     def constant(self, value: float) -> Float:
         """An array of lanes that holds one number."""

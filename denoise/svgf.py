@@ -15,27 +15,25 @@ Departures, beside those that the three modules list:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import drjit as dr
 import numpy as np
 
-from render.errors import InputError
 from render.frame import Frame
 
 from .atrous import EPSILON, LARGEST_LEVELS, LOG2E, luminance_scale, with_green
 from .demodulation import Texture, read_texture
-from .history import no_history, pack_records
+from .history import RecordState, no_history, pack_records
 from .lanes import OnLanes
 from .moments import SHORT, accumulate, estimate_variances, tabulate
-from .parameters import check_positive, check_range
-from .reprojection import check_motion, load_table, motion_table
-from .stencil import Float, Planes, Stencil, Step, Taps
-from .surface import Surface, camera_from_screen, luminance, repair
-from .wavelet import OUTSIDE, WINDOW_5x5, filter_level, read_guides
+from .parameters import check_positive, check_range, check_whole
+from .reprojection import motion_between, without_images
+from .stencil import Float, Planes, Stencil, Step, Taps, window
+from .surface import Surface, luminance, repair
+from .wavelet import OUTSIDE, filter_level, read_guides
 
-WINDOW_3x3 = [(dy, dx) for dy, dx in WINDOW_5x5 if max(abs(dy), abs(dx)) == 1]
 SIGNALS = ("direct", "indirect")
 
 
@@ -77,9 +75,7 @@ class Svgf(OnLanes):
     uses: ClassVar[tuple[str, ...]] = SIGNALS
 
     def __post_init__(self) -> None:
-        if not isinstance(self.levels, int) or not 1 <= self.levels <= LARGEST_LEVELS:
-            raise InputError(f"levels is {self.levels}: "
-                             f"use a whole number from 1 to {LARGEST_LEVELS}")
+        check_whole(self, "levels", LARGEST_LEVELS)
         for name in ("alpha", "alpha_moments"):
             check_range(self, name, 1e-6, 1.0)
         check_range(self, "longest", 1.0, 1e6)
@@ -90,8 +86,8 @@ class Svgf(OnLanes):
     def reach(self) -> int:
         return 2 << (self.levels - 1)
 
-    def init_on(self, stencil: Stencil) -> SvgfState:
-        return SvgfState(stencil, no_history(stencil))
+    def init_on(self, stencil: Stencil) -> RecordState:
+        return RecordState(stencil, no_history(stencil))
 
     def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
                  state: Any) -> tuple[list[Float], Any]:
@@ -124,8 +120,7 @@ class Svgf(OnLanes):
         changes: lambda of each signal (see `moments.py`), or none.
         """
         stencil = state.stencil
-        previous = state.previous or frame
-        check_motion(previous, frame)
+        table, dual = motion_between(state.previous or frame, frame, stencil)
         works = state.works
         if works is None or len(works.filters) != len(lights):
             works = Works.make(self, stencil, len(lights))
@@ -134,8 +129,6 @@ class Svgf(OnLanes):
         guides = read_guides(stencil, surface, self.sigma_depth)
         dr.eval(signal, near, guides)
         works.guides.store(guides[:4])
-        table = load_table(motion_table(previous, frame), stencil)
-        dual = [stencil.opaque(x) for x in camera_from_screen(previous).T.ravel()]
         numbers = [stencil.opaque(x) for x in (self.alpha_moments, self.longest, self.min_cosine,
                                                self.plane_tolerance)]
         colors, moments, lengths, window = works.accumulate(
@@ -155,19 +148,8 @@ class Svgf(OnLanes):
         records = state.records
         if self.accumulate:
             records = works.pack(near, kept, moments, lengths)
-        seen = Frame(frame.index, {"id": frame["id"]}, frame.camera_from_world,
-                     frame.screen_from_world, frame.world_from_object)
-        return lights, replace(state, works=works, records=records, previous=seen)
-
-
-@dataclass(frozen=True)
-class SvgfState:
-    """Records of the previous frame and its matrices; planes and steps once they are made."""
-
-    stencil: Stencil
-    records: Float = field(repr=False)
-    previous: Frame | None = None
-    works: Works | None = None
+        return lights, replace(state, works=works, records=records,
+                               previous=without_images(frame))
 
 
 @dataclass(frozen=True)
@@ -222,9 +204,9 @@ class Levels:
         signal = stencil.planes([0.0] * 4)
         taps = []
         for i in range(levels):
-            offsets = [(dy << i, dx << i) for dy, dx in WINDOW_5x5]
+            offsets = [(dy << i, dx << i) for dy, dx in window(2)]
             taps.append((signal.taps(offsets), guides.taps(offsets)))
-        return Levels(signal, signal.taps(WINDOW_3x3), taps,
+        return Levels(signal, signal.taps(window(1)), taps,
                       [stencil.opaque(1 << i) for i in range(levels)],
                       [Step(luminance_scale) for _ in taps], [Step(filter_level) for _ in taps])
 

@@ -25,10 +25,10 @@ import drjit as dr
 from render.frame import Frame
 
 from .lanes import OnLanes
-from .parameters import check_positive, check_radius, check_range
-from .reprojection import Tests, check_motion, load_table, motion_table, pack, reproject
+from .parameters import check_positive, check_range, check_whole
+from .reprojection import Tests, motion_between, pack, reproject, without_images
 from .stencil import Float, Stencil, Step, Taps
-from .surface import Surface, camera_from_screen
+from .surface import Surface
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Temporal(OnLanes):
         check_range(self, "color_box", 0.0, 1e6)
         check_range(self, "min_cosine", -1.0, 1.0)
         check_positive(self, "plane_tolerance")
-        check_radius(self, "clamp_radius", largest=16)
+        check_whole(self, "clamp_radius", 16)
 
     @property
     def reach(self) -> int:
@@ -81,10 +81,8 @@ class Temporal(OnLanes):
             history = pack(stencil, color, guides)
             dr.eval(history)
             return color, state.after(frame, history)
-        check_motion(previous, frame)
+        table, dual = motion_between(previous, frame, stencil)
         state.color.store(color)
-        table = load_table(motion_table(previous, frame), stencil)
-        dual = [stencil.opaque(x) for x in camera_from_screen(previous).T.ravel()]
         numbers = [stencil.opaque(x) for x in (self.alpha, self.color_box, self.min_cosine,
                                                self.plane_tolerance)]
         result, history = state.blend(state.taps, color, guides, [table], dual, [state.history],
@@ -105,9 +103,7 @@ class TemporalState:
 
     def after(self, frame: Frame, history: Float) -> TemporalState:
         """The state for the frame after `frame`; of that one only the matrices are kept."""
-        seen = Frame(frame.index, {"id": frame["id"]}, frame.camera_from_world,
-                     frame.screen_from_world, frame.world_from_object)
-        return replace(self, previous=seen, history=history)
+        return replace(self, previous=without_images(frame), history=history)
 
 
 def clamp_and_blend(stencil: Stencil, tests: Tests, taps: Taps, color: list[Float],

@@ -23,13 +23,12 @@ import drjit as dr
 
 from .atrous import LOG2E, SPLINE
 from .exponential import exp2
-from .stencil import Float, Offset, Stencil, Taps
+from .stencil import Float, Stencil, Taps, window
 from .surface import Surface
 
 EPSILON_DEPTH = 1e-3
 _BACKGROUND = 1e20   # depth where there is no surface: far from any, so that its weight is 0
 OUTSIDE = [0.0, 0.0, 0.0, 1e26]  # n, z outside the image
-WINDOW_5x5: list[Offset] = [(dy, dx) for dy in range(-2, 3) for dx in range(-2, 3) if dy or dx]
 
 
 def read_guides(stencil: Stencil, surface: Surface, sigma_depth: float) -> list[Float]:
@@ -63,7 +62,7 @@ def filter_level(signal: Taps, guides: Taps, center: list[Float], center_guides:
     *color, v = center
     sums, v, total = [c * h0 for c in color], v * h0**2, type(spacing)(h0)
     gx, gy = (g * spacing for g in center_guides[4:6])
-    for i, (dy, dx) in enumerate(WINDOW_5x5):
+    for i, (dy, dx) in enumerate(window(2)):
         *tap, tap_v = signal.at(i)
         gradient = dr.abs(dr.fma(gx, float(dx), gy * float(dy)))
         e = geometry_exponent(center_guides, guides.at(i), gradient, half_power)
