@@ -46,14 +46,13 @@ from .atrous import EPSILON, LOG2E
 from .exponential import exp2
 from .history import look_up
 from .reprojection import locate
-from .sparse import weighted_sums
+from .sparse import tabulate, weighted_sums, window_taps
 from .stencil import Float, Offset, Stencil, Taps, window
 
 BINOMIAL = {0: 1 / 2, 1: 1 / 4}
 ENERGY_LEVELS = 2
 LEAST_NOISE = 0.25    # share of the innovation's energy that is at least noise of d
 RADIUS = 2            # pixels, of the window of the spatial variance
-_ENTRY = 8            # words of its table: luminances of up to three signals, 1/z
 _NEVER = -1e3         # log2 of a weight that is 0
 _MOST = 1e36          # squares of luminance stay below: sums of them must not overflow
 _LEAST = 1e-20        # square of a luminance that is taken for 0
@@ -174,25 +173,18 @@ def spatial_variances(stencil: Stencil, sizes: tuple[int, ...], signal: list[Flo
     starts = [sum(sizes[:s]) for s in range(len(sizes))]
     lum = [signal[start + luma(size)] for start, size in zip(starts, sizes)]
     inverse_depth, gx, gy, scale = guides
-    words = [*lum, *(stencil.Float(0) for _ in range(_ENTRY - 1 - len(lum))), inverse_depth]
-    table = stencil.pack(words)
+    table = tabulate(stencil, [inverse_depth, *lum])
     dr.eval(table)
-    row, column = (stencil.Int(i) for i in stencil.pixel())
-    side = 2 * RADIUS + 1
+    around = window_taps(stencil, RADIUS, table)
 
     def tap(i: Any) -> tuple[Float, list[Float]]:
-        dy = i // side
-        y, x = row + dy - RADIUS, column + (i - side * dy) - RADIUS
-        inside = (y >= 0) & (y < stencil.height) & (x >= 0) & (x < stencil.width)
-        lane = stencil.UInt(dr.select(inside, y * stencil.stride + x, 0))
-        around = dr.gather(stencil.ArrayXf, table, lane, shape=(_ENTRY, stencil.lanes))
-        expected = dr.fma(gx, stencil.Float(x - column),
-                          dr.fma(gy, stencil.Float(y - row), inverse_depth))
-        near = inside & (dr.abs(around[_ENTRY - 1] - expected) * scale < 1)
-        d = [around[s] - c for s, c in enumerate(lum)]
+        inside, dy, dx, words = around(i)
+        expected = dr.fma(gx, dx, dr.fma(gy, dy, inverse_depth))
+        near = inside & (dr.abs(words[0] - expected) * scale < 1)
+        d = [there - here for there, here in zip(words[1:], lum)]
         return dr.select(near, stencil.Float(1), 0), [*d, *(dr.square(x) for x in d)]
 
-    count, sums = weighted_sums(stencil, wanted, side**2, 2 * len(lum), tap)
+    count, sums = weighted_sums(stencil, wanted, (2 * RADIUS + 1)**2, 2 * len(lum), tap)
     norm = 1 / dr.maximum(count, 1)
     means, squares = [x * norm for x in sums[:len(lum)]], [x * norm for x in sums[len(lum):]]
     variances = [dr.fma(-m, m, m2) for m, m2 in zip(means, squares)]

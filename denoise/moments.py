@@ -24,7 +24,7 @@ import drjit as dr
 from .exponential import exp2
 from .history import look_up
 from .reprojection import locate
-from .sparse import weighted_sums
+from .sparse import weighted_sums, window_taps
 from .stencil import Float, Stencil
 from .wavelet import geometry_exponent
 
@@ -32,7 +32,6 @@ FORGETTING = 10      # power of 1 - lambda that a length is multiplied by
 SHORT = 4.0          # frames of history from which on its moments give the variance
 RADIUS = 3           # pixels, of the window of the spatial estimate
 VALUES = 5           # a signal's in a record: r, l, b, m1, m2
-_ENTRY = 8           # words of the window's table: moments of two signals, n, z
 
 
 def accumulate(stencil: Stencil, fallback: bool, signal: list[Float], surface: list[Float],
@@ -73,12 +72,6 @@ def accumulate(stencil: Stencil, fallback: bool, signal: list[Float], surface: l
     return colors, moments, lengths
 
 
-def tabulate(stencil: Stencil, moments: list[Float], guides: list[Float]) -> Float:
-    """The table that `estimate_variances` looks its window up in."""
-    words = [*moments, *guides[:4]]
-    return stencil.pack([*words, *[stencil.Float(0)] * (_ENTRY - len(words))])
-
-
 def estimate_variances(stencil: Stencil, moments: list[Float], lengths: list[Float],
                        guides: list[Float], table: list[Float],
                        numbers: list[Float]) -> list[Float]:
@@ -87,23 +80,15 @@ def estimate_variances(stencil: Stencil, moments: list[Float], lengths: list[Flo
     wanted = lengths[0] < enough
     for h in lengths[1:]:
         wanted |= h < enough
-    row, column = (stencil.Int(i) for i in stencil.pixel())
-    side = 2 * RADIUS + 1
-    count = len(moments)
+    count, around = len(moments), window_taps(stencil, RADIUS, table[0])
 
     def tap(i: Any) -> tuple[Float, list[Float]]:
-        dy = i // side
-        y, x = row + dy - RADIUS, column + (i - side * dy) - RADIUS
-        inside = (y >= 0) & (y < stencil.height) & (x >= 0) & (x < stencil.width)
-        lane = stencil.UInt(dr.select(inside, y * stencil.stride + x, 0))
-        words = dr.gather(stencil.ArrayXf, table[0], lane, shape=(_ENTRY, stencil.lanes))
-        gradient = dr.abs(dr.fma(guides[4], stencil.Float(x - column),
-                                 guides[5] * stencil.Float(y - row)))
-        around = [words[count + k] for k in range(4)]
-        w = exp2(geometry_exponent(guides, around, gradient, half_power))
-        return dr.select(inside, w, 0), [words[k] for k in range(count)]
+        inside, dy, dx, words = around(i)
+        gradient = dr.abs(dr.fma(guides[4], dx, guides[5] * dy))
+        w = exp2(geometry_exponent(guides, words[count:count + 4], gradient, half_power))
+        return dr.select(inside, w, 0), words[:count]
 
-    total, sums = weighted_sums(stencil, wanted, side**2, count, tap)
+    total, sums = weighted_sums(stencil, wanted, (2 * RADIUS + 1)**2, count, tap)
     norm = dr.select(wanted, 1 / dr.select(wanted, total, 1), 0)
     variances = []
     for s in range(0, count, 2):

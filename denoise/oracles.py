@@ -169,10 +169,13 @@ def previous_screen(previous: Frame, frame: Frame) -> np.ndarray:
 
 
 def reproject_bilinear(previous: Frame, frame: Frame, history: np.ndarray, min_cosine: float = 0.9,
-                       plane_tolerance: float = 0.02) -> np.ndarray:
-    """(h, w, 3) history of each pixel from tested bilinear taps; NaN where there is none."""
+                       plane_tolerance: float = 0.02, fallback: bool = False) -> np.ndarray:
+    """(h, w, c) history of each pixel from tested bilinear taps; NaN where there is none.
+
+    fallback: where none passes, the mean of those of the 3x3 pixels around that do.
+    """
     h, w = frame["id"].shape
-    screen, result = previous_screen(previous, frame), np.full((h, w, 3), np.nan)
+    screen, result = previous_screen(previous, frame), np.full(history.shape, np.nan)
     for y, x in np.argwhere(frame["id"] >= 0):
         i = frame["id"][y, x]
         motion = previous.world_from_object[i] @ np.linalg.inv(frame.world_from_object[i])
@@ -181,19 +184,22 @@ def reproject_bilinear(previous: Frame, frame: Frame, history: np.ndarray, min_c
         px, py, z = screen[y, x]
         if not (0 <= px < w and 0 <= py < h):
             continue
+
+        def passes(ty, tx, i=i, n=n, world=world, z=z):
+            if not (0 <= tx < w and 0 <= ty < h) or previous["id"][ty, tx] != i:
+                return False
+            off_plane = abs(n @ (previous["position"][ty, tx] - world))
+            return n @ previous["normal"][ty, tx] > min_cosine and off_plane < plane_tolerance * z
+
         left, top = int(np.floor(px - 0.5)), int(np.floor(py - 0.5))
-        total, weights = np.zeros(3), 0.0
-        for ty in (top, top + 1):
-            for tx in (left, left + 1):
-                if not (0 <= tx < w and 0 <= ty < h) or previous["id"][ty, tx] != i:
-                    continue
-                off_plane = abs(n @ (previous["position"][ty, tx] - world))
-                if n @ previous["normal"][ty, tx] > min_cosine and off_plane < plane_tolerance * z:
-                    weight = (1 - abs(px - 0.5 - tx)) * (1 - abs(py - 0.5 - ty))
-                    total += weight * history[ty, tx]
-                    weights += weight
-        if weights >= 0.01:
-            result[y, x] = total / weights
+        taps = [((1 - abs(px - 0.5 - tx)) * (1 - abs(py - 0.5 - ty)), ty, tx)
+                for ty in (top, top + 1) for tx in (left, left + 1) if passes(ty, tx)]
+        if fallback and sum(t[0] for t in taps) < 0.01:
+            taps = [(1.0, int(py) + dy, int(px) + dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1)
+                    if passes(int(py) + dy, int(px) + dx)]
+        total = sum(t[0] for t in taps)
+        if total >= 0.01:
+            result[y, x] = sum(weight * history[ty, tx] for weight, ty, tx in taps) / total
     return result
 
 

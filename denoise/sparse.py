@@ -6,12 +6,14 @@ taps are gathers, since a shifted view would be read by every lane.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import drjit as dr
 
 from .stencil import Float, Stencil
+
+WORDS = 8  # floats a lane in the table of a window: what one gather brings
 
 _while_loop: Any = dr.while_loop  # its type hints know loops of one variable only
 
@@ -33,3 +35,29 @@ def weighted_sums(stencil: Stencil, wanted: Any, taps: int, count: int,
         (dr.select(wanted, stencil.Int(0), taps), zeros[0], zeros[1:]),
         lambda i, total, sums: i < taps, body, labels=("tap", "total", "sums"))
     return total, sums
+
+
+def tabulate(stencil: Stencil, words: Sequence[Float]) -> Float:
+    """The table of a window: up to `WORDS` numbers a lane."""
+    return stencil.pack([*words, *[stencil.Float(0)] * (WORDS - len(words))])
+
+
+def window_taps(stencil: Stencil, radius: int,
+                table: Float) -> Callable[[Any], tuple[Any, Float, Float, list[Float]]]:
+    """Function of a tap's index in the window of (2 radius + 1)^2 pixels, the pixel included.
+
+    It returns whether the tap is inside the image, its offset (dy, dx), and its words in the table.
+    """
+    row, column = (stencil.Int(i) for i in stencil.pixel())
+    side = 2 * radius + 1
+
+    def tap(i: Any) -> tuple[Any, Float, Float, list[Float]]:
+        dy = i // side
+        dy, dx = dy - radius, i - side * dy - radius
+        y, x = row + dy, column + dx
+        inside = (y >= 0) & (y < stencil.height) & (x >= 0) & (x < stencil.width)
+        lane = stencil.UInt(dr.select(inside, y * stencil.stride + x, 0))
+        words = dr.gather(stencil.ArrayXf, table, lane, shape=(WORDS, stencil.lanes))
+        return inside, stencil.Float(dy), stencil.Float(dx), [words[k] for k in range(WORDS)]
+
+    return tap

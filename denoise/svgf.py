@@ -27,9 +27,10 @@ from .atrous import EPSILON, LARGEST_LEVELS, LOG2E, luminance_scale, with_green
 from .demodulation import Texture, read_texture
 from .history import RecordState, no_history, pack_records
 from .lanes import OnLanes
-from .moments import SHORT, accumulate, estimate_variances, tabulate
+from .moments import SHORT, accumulate, estimate_variances
 from .parameters import check_positive, check_range, check_whole
 from .reprojection import motion_between, without_images
+from .sparse import tabulate
 from .stencil import Float, Planes, Stencil, Step, Taps, window
 from .surface import Surface, luminance, repair
 from .wavelet import OUTSIDE, filter_level, read_guides
@@ -170,7 +171,7 @@ class Works:
                   records: list[Float], guides: list[Float], *rest: list[Float]) -> Any:
             colors, moments, lengths = accumulate(stencil, method.fallback, signal, near, table,
                                                   dual, records, *rest)
-            window = tabulate(stencil, moments, guides)
+            window = tabulate(stencil, [*moments, *guides[:4]])
             dr.eval(colors, moments, lengths, window)
             return colors, moments, lengths, window
 

@@ -130,7 +130,8 @@ def _render_reference(job: RenderJob, sequence: FrameSequence, index: int,
     """One reference; its progress is kept on disk every few seconds and when interrupted."""
     spp = job.reference_spp
     assert spp is not None
-    progress = _saved_progress(job, sequence, index) or Progress.start(job.height, job.width)
+    progress = (_saved_progress(job, sequence, index) or _smaller_reference(job, sequence, index)
+                or Progress.start(job.height, job.width))
     saved = time.monotonic()
 
     def after_pass(progress: Progress) -> None:
@@ -173,6 +174,19 @@ def _saved_progress(job: RenderJob, sequence: FrameSequence, index: int) -> Prog
     progress = Progress(*sums, passes, samples)
     same = spp == job.reference_spp and antialias == job.antialias
     return progress if same and _fits(job, progress) else None
+
+
+def _smaller_reference(job: RenderJob, sequence: FrameSequence, index: int) -> Progress | None:
+    """What a reference of fewer samples amounts to, if its passes are the first of ours."""
+    try:
+        smaller = sequence.read_reference(index) if sequence.has_reference(index) else None
+    except InputError:  # damaged: it is made again
+        return None
+    if smaller is None or not 2 <= smaller.spp < (job.reference_spp or 0):
+        return None
+    passes = pass_sizes(smaller.spp, job.height * job.width)
+    sizes = pass_sizes(job.reference_spp or 0, job.height * job.width)
+    return Progress.of(smaller, len(passes)) if sizes[:len(passes)] == passes else None
 
 
 def _fits(job: RenderJob, progress: Progress) -> bool:

@@ -1,4 +1,4 @@
-"""The reference: the frame's own estimator with many samples, through the same pixel centres.
+"""The reference: resampled direct light and many samples, through the frame's pixel centres.
 
 Rendered in independent passes, so that it can show progress, be stopped and continued, and say
 how noisy it is itself.
@@ -49,6 +49,13 @@ class Progress:
         self.total += total
         self.squares += total * total / samples
         self.samples += samples
+
+    @classmethod
+    def of(cls, reference: Reference, passes: int) -> Progress:
+        """What a finished reference amounts to, but for its rounding to float32."""
+        mean, samples = reference.color.astype(np.float64), reference.spp
+        spread = reference.variance.astype(np.float64) * (passes - 1) * samples
+        return cls(samples * mean, spread + samples * mean * mean, passes, samples)
 
     def reference(self) -> Reference:
         mean = self.total / self.samples

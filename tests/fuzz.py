@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 from report_sequence import make_report_sequence
 from small_sequence import small_sequence
+from test_command import SCENE
 
 from denoise.compare import comparison
 from denoise.cost import cost
@@ -52,20 +53,6 @@ _VALUES: tuple[Any, ...] = (
 _WORDS = ("None,", "0,", "-1", "(", ")", "float('nan')", "float('inf'),", "'../x',", "()", "[]",
           "raise ValueError('a\\nb')", "@", "translate((1, 2))", "scale(0)", "1/0", "exit()", "\0",
           "''", "10**30,", "1e400")
-
-SCENE = '''
-from scenes.description import Camera, Rectangle, Scene, Shape, Sphere
-from scenes.materials import diffuse
-from scenes.transforms import look_at, rotate, scale, translate
-
-def scene():
-    return Scene("mine", "a scene", (
-        Shape("floor", Rectangle(), diffuse((0.5, 0.5, 0.5)), rotate((1, 0, 0), -90) @ scale(4)),
-        Shape("ball", Sphere(), diffuse((0.8, 0.3, 0.2)),
-              lambda f: translate((0.1 * f, 1, 0)) @ scale(0.5)),
-        Shape("lamp", Sphere(), diffuse((0, 0, 0)), translate((0, 4, 0)), (9.0, 9.0, 9.0)),
-    ), Camera(look_at((0, 2, 6), (0, 1, 0))), frames=3, width=16, height=12)
-'''
 
 
 @dataclass(frozen=True)

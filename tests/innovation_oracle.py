@@ -15,10 +15,16 @@ def lum(image: np.ndarray) -> np.ndarray:
     return luminance(image) if image.shape[-1] == 3 else image[..., 0]
 
 
-def signals_of(frame: Frame) -> dict[str, np.ndarray]:
-    """L, G and V, (h, w, c)."""
+def texture_of(frame: Frame) -> np.ndarray:
+    """(h, w, 3) albedo that can be divided by."""
     albedo = np.maximum(frame["albedo"].astype(float), 0.01)
     albedo[(frame["albedo"] < 0.01).all(-1)] = 1
+    return albedo
+
+
+def signals_of(frame: Frame) -> dict[str, np.ndarray]:
+    """L, G and V, (h, w, c)."""
+    albedo = texture_of(frame)
     v = np.minimum(frame["visibility"][..., None].astype(float), 2)
     rest = (frame["direct"].astype(float) + frame["indirect"] - frame["specular"]
             - v * frame["unshadowed"])
@@ -26,8 +32,7 @@ def signals_of(frame: Frame) -> dict[str, np.ndarray]:
 
 
 def color_of(frame: Frame, signals: dict[str, np.ndarray]) -> np.ndarray:
-    albedo = np.maximum(frame["albedo"].astype(float), 0.01)
-    albedo[(frame["albedo"] < 0.01).all(-1)] = 1
+    albedo = texture_of(frame)
     return (frame["emission"] + signals["V"] * frame["unshadowed"] + albedo * signals["L"]
             + signals["G"])
 
@@ -127,12 +132,9 @@ def spatial_variance(frame: Frame, signal: np.ndarray, m) -> np.ndarray:
 
 def look_up(previous: Frame, frame: Frame, image: np.ndarray, m) -> tuple:
     """History, 0 where there is none, and where there is one."""
-    padded = np.concatenate([image, np.zeros((*image.shape[:2], -image.shape[-1] % 3))], -1)
-    parts = [reproject_bilinear(previous, frame, padded[..., c:c + 3], m.min_cosine,
-                                m.plane_tolerance) for c in range(0, padded.shape[-1], 3)]
-    joined = np.concatenate(parts, -1)[..., :image.shape[-1]]
-    found = np.isfinite(joined).all(-1)
-    return np.where(found[..., None], joined, 0), found
+    history = reproject_bilinear(previous, frame, image, m.min_cosine, m.plane_tolerance)
+    found = np.isfinite(history).all(-1)
+    return np.where(found[..., None], history, 0), found
 
 
 def run(frames: list[Frame], m) -> np.ndarray:

@@ -78,39 +78,6 @@ def level(frame: Frame, color: np.ndarray, variance: np.ndarray, step: int, sigm
     return total / weights[..., None], squares / weights**2
 
 
-def look_up(previous: Frame, frame: Frame, values: np.ndarray, fallback: bool,
-            min_cosine: float, plane_tolerance: float) -> np.ndarray:
-    """(h, w, c) history: tested bilinear taps, else the 3x3 mean of those that pass, else NaN."""
-    h, w = frame["id"].shape
-    screen, result = oracles.previous_screen(previous, frame), np.full(values.shape, np.nan)
-    for y, x in np.argwhere(frame["id"] >= 0):
-        i = frame["id"][y, x]
-        motion = previous.world_from_object[i] @ np.linalg.inv(frame.world_from_object[i])
-        n = motion[:3, :3] @ frame["normal"][y, x]
-        world = (motion @ np.append(frame["position"][y, x].astype(np.float64), 1))[:3]
-        px, py, z = screen[y, x]
-        if not (0 <= px < w and 0 <= py < h):
-            continue
-
-        def passes(ty, tx, i=i, n=n, world=world, z=z):
-            if not (0 <= tx < w and 0 <= ty < h) or previous["id"][ty, tx] != i:
-                return False
-            off_plane = abs(n @ (previous["position"][ty, tx] - world))
-            return n @ previous["normal"][ty, tx] > min_cosine and off_plane < plane_tolerance * z
-
-        left, top = int(np.floor(px - 0.5)), int(np.floor(py - 0.5))
-        taps = [((1 - abs(px - 0.5 - tx)) * (1 - abs(py - 0.5 - ty)), ty, tx)
-                for ty in (top, top + 1) for tx in (left, left + 1)]
-        taps = [tap for tap in taps if passes(*tap[1:])]
-        if sum(t[0] for t in taps) < 0.01 and fallback:
-            taps = [(1.0, int(py) + dy, int(px) + dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1)
-                    if passes(int(py) + dy, int(px) + dx)]
-        if sum(t[0] for t in taps) >= 0.01:
-            result[y, x] = (sum(t[0] * values[t[1], t[2]] for t in taps)
-                            / sum(t[0] for t in taps))
-    return result
-
-
 def svgf(frames: list[Frame], alpha: float = 0.2, alpha_moments: float = 0.2, longest: float = 32,
          levels: int = 5, sigma_luminance: float = 4, sigma_depth: float = 1,
          normal_power: float = 128, min_cosine: float = 0.9, plane_tolerance: float = 0.02,
@@ -131,7 +98,8 @@ def svgf(frames: list[Frame], alpha: float = 0.2, alpha_moments: float = 0.2, lo
                for c in lights]
         old = np.full((*shape, 1 + 5 * len(now)), np.nan)
         if records is not None and accumulate:
-            old = look_up(previous, frame, records, fallback, min_cosine, plane_tolerance)
+            old = oracles.reproject_bilinear(previous, frame, records, min_cosine,
+                                             plane_tolerance, fallback)
         found = np.isfinite(old[..., :1])
         length = np.where(found, np.minimum(old[..., :1] + 1, longest), 1)
         weight = np.concatenate([np.maximum(a, 1 / length) for a in

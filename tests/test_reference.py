@@ -8,6 +8,7 @@ from furnace import furnace
 from test_renderer import small_scene
 
 import render.job
+import render.reference
 from render.errors import InputError
 from render.job import RenderJob, render_sequence
 from render.reference import Progress, pass_sizes, render_reference
@@ -129,3 +130,26 @@ def test_an_edited_scene_is_not_taken_for_the_old_one(tmp_path):
     render_sequence(RenderJob(small_scene(), [0], SIZE, SIZE), tmp_path / "a")
     with pytest.raises(InputError, match=r"has changed.*--overwrite"):
         render_sequence(RenderJob(small_scene(max_depth=4), [0], SIZE, SIZE), tmp_path / "a")
+
+
+@pytest.mark.parametrize(("more", "passes"), [(48, 4), (33, 9), (16, 8)])
+def test_a_reference_of_more_samples_goes_on_from_the_one_of_fewer(tmp_path, monkeypatch, more,
+                                                                   passes):
+    monkeypatch.setattr(render.reference, "LARGEST_PASS", 4)
+    real, numbers = Renderer.sample_sum, []
+
+    def counted(self, index, seed, number, *arguments):
+        numbers.append(number)
+        return real(self, index, seed, number, *arguments)
+
+    scene = small_scene()
+    anew = render_sequence(RenderJob(scene, [0], SIZE, SIZE, reference_spp=more), tmp_path / "anew")
+    render_sequence(RenderJob(scene, [0], SIZE, SIZE, reference_spp=32), tmp_path / "raised")
+    monkeypatch.setattr(Renderer, "sample_sum", counted)
+    raised = render_sequence(RenderJob(scene, [0], SIZE, SIZE, reference_spp=more),
+                             tmp_path / "raised")
+    a, b = anew.read_reference(0), raised.read_reference(0)
+    assert numbers == list(range(len(pass_sizes(more))))[-passes:]
+    assert b.spp == more
+    np.testing.assert_allclose(b.color, a.color, rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(b.variance, a.variance, rtol=1e-4, atol=1e-7)

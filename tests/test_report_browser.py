@@ -343,12 +343,17 @@ def test_without_references_it_shows_pictures_and_no_empty_plots(browser, tmp_pa
     page.close()
 
 
-def test_only_what_is_looked_at_is_loaded(browser, report):
-    page = new_page(browser)
-    asked = []
+def open_and_watch(browser, report, hash_):
+    """The page, and the names of the files that it has asked for so far."""
+    page, asked = new_page(browser), []
     page.on("request", lambda request: asked.append(request.url.rsplit("/report/", 1)[-1]))
-    page.goto(report[2] + "#frame=1&a=input&b=fine")
+    page.goto(report[2] + hash_)
     page.wait_for_selector(READY)
+    return page, asked
+
+
+def test_only_what_is_looked_at_is_loaded(browser, report):
+    page, asked = open_and_watch(browser, report, "#frame=1&a=input&b=fine")
     page.wait_for_function("document.getElementById('pixel').textContent.includes('·')")
     page.wait_for_function("document.querySelectorAll('#pixels tr').length === 3")
     page.wait_for_timeout(200)  # for anything more
@@ -359,11 +364,7 @@ def test_only_what_is_looked_at_is_loaded(browser, report):
 
 
 def test_frames_that_fly_by_are_not_loaded(browser, report):
-    page = new_page(browser)
-    asked = []
-    page.on("request", lambda request: asked.append(request.url.rsplit("/report/", 1)[-1]))
-    page.goto(report[2] + "#frame=0&a=input&b=fine")
-    page.wait_for_selector(READY)
+    page, asked = open_and_watch(browser, report, "#frame=0&a=input&b=fine")
     page.evaluate("""() => [1, 2, 3].forEach((n) => {
         const slider = document.getElementById("frame");
         slider.value = n;
