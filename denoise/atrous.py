@@ -106,14 +106,15 @@ class Atrous(OnLanes):
         light = [light[0], luminance(light), light[2]]
         dr.eval(light, guides, plane)
         state.guides.store(guides)
-        state.signal.store(light)
+        state.signal.store(light, gutters=True)
         signal = [*light, state.variance_step(*state.variance_taps, plane)]
         state.signal.store(signal[3:], first=3)
         numbers = [stencil.opaque(EPSILON), stencil.opaque(self.sigma_luminance / LOG2E),
                    stencil.opaque(math.sqrt(LOG2E * self.normal_power / 2))]
         for i in range(self.levels):
             if i > 0:
-                state.signal.store(signal)
+                state.signal.store(signal[:3], gutters=True)
+                state.signal.store(signal[3:], first=3)
             signal = state.level_steps[i](state.blur_taps, *state.level_taps[i], signal[3:], plane,
                                           [state.spacings[i], *numbers])
         return texture.restore(with_green(signal)), state

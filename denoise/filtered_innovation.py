@@ -215,7 +215,7 @@ class Works:
         values = [energies[0], *innovation, *energies]
         for level in self.smoothing:
             count = len(level.taps[0].at(0))
-            self.values.store(values[:count])
+            self.values.store(values[:count], gutters=True)
             values[:count] = level.step(*level.taps, plane, [level.spacing])
         return values[:1 + len(innovation)], values[1 + len(innovation):]
 
@@ -225,7 +225,7 @@ class Works:
         values = list(values)
         for level in self.levels:
             count = len(level.taps[0].at(0))
-            self.values.store(values[:count])
+            self.values.store(values[:count], gutters=True)
             values[:count] = level.step(*level.taps, plane, [level.spacing], fade, sigmas)
         starts = [sum(self.sizes[:s]) + s for s in range(len(self.sizes))]
         return [values[start:start + size] for start, size in zip(starts, self.sizes)]

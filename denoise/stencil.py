@@ -120,16 +120,15 @@ class Stencil:
 
     def image(self, arrays: Sequence[Float]) -> np.ndarray:
         """Arrays of lanes to an (h, w, c) float32 image, (h, w) for one, in new memory."""
-        lane = dr.arange(self.UInt, self.lanes)
-        row = lane // self.stride
-        column = lane - row * self.stride
-        flat = dr.empty(self.Float, self.height * self.width * len(arrays))
-        start = (row * self.width + column) * len(arrays)
+        dr.eval(*arrays)
+        image = np.empty((self.height, self.width, len(arrays)), np.float32)
         for c, array in enumerate(arrays):
-            dr.scatter(flat, array, start + c, column < self.width)
-        dr.eval(flat)
-        shape = (self.height, self.width) + ((len(arrays),) if len(arrays) > 1 else ())
-        return flat.numpy().reshape(shape)
+            image[..., c] = self.rows(array.numpy())
+        return image if len(arrays) > 1 else image[..., 0]
+
+    def rows(self, lanes: np.ndarray) -> np.ndarray:
+        """(h, w) view of an array of lanes."""
+        return lanes.reshape(self.height, self.stride)[:, :self.width]
 
     def opaque(self, value: float) -> Float:
         """A number that a kernel takes as an argument: another value recompiles nothing."""
@@ -179,28 +178,36 @@ class Planes:
     def __init__(self, stencil: Stencil, outside: tuple[float, ...], aligned: bool) -> None:
         self.stencil = stencil
         self._views: dict[tuple[int, int, int], Float] = {}
-        self._memory, self._arrays = [], []
+        self._memory, self._targets, self._arrays = [], [], []
         for value in outside:
             if stencil.layout == "views":
                 index, shift = stencil.planes_made, 0 if aligned else _SHIFT
                 self._memory.append(_allocate(stencil.size, value, index, shift))
                 stencil.planes_made += 1
+                self._targets.append(self._memory[-1][stencil.top:stencil.top + stencil.lanes])
             else:
                 self._arrays.append(dr.opaque(stencil.Float, float(value), stencil.size))
 
-    def store(self, arrays: Sequence[Float], first: int = 0) -> None:
-        """Copy evaluated arrays of lanes into planes from `first` on; gutters are left out."""
+    def store(self, arrays: Sequence[Float], first: int = 0, gutters: bool = False) -> None:
+        """Copy evaluated arrays of lanes into planes from `first` on.
+
+        Args:
+            gutters: copy those too, a quarter quicker: where another plane, which keeps its own,
+                takes their weight away, so that they need only be finite.
+        """
         s = self.stencil
         if s.layout == "gather":
             lane = dr.arange(s.UInt, s.lanes)
-            inside = lane % s.stride < s.width
+            inside = True if gutters else lane % s.stride < s.width
             for plane, array in zip(self._arrays[first:], arrays):
                 dr.scatter(plane, array, lane + s.top, inside)
             dr.eval(self._arrays)
             return
-        for memory, array in zip(self._memory[first:], arrays):
-            rows = memory[s.top:s.top + s.lanes].reshape(s.height, s.stride)
-            np.copyto(rows[:, :s.width], array.numpy().reshape(rows.shape)[:, :s.width])
+        for target, array in zip(self._targets[first:], arrays):
+            if gutters:
+                np.copyto(target, array.numpy())
+            else:
+                np.copyto(s.rows(target), s.rows(array.numpy()))
 
     def taps(self, offsets: Sequence[Offset], count: int | None = None) -> Taps:
         """The (first `count`) planes seen from the neighbours at offsets (dy, dx)."""
