@@ -52,6 +52,15 @@ _ROWS = (
             "direct light as if nothing cast a shadow, noise-free (`--direct resampled` only)"),
     Channel("visibility", ("visibility",), False, 0.0,
             "share of `unshadowed` that arrives, one noisy sample, may exceed 1 (likewise)"),
+    Channel("light", ("light.X", "light.Y", "light.Z"), False, 0.0,
+            "from the first hit to the point of a light that its shadow ray asked for, world axes, "
+            "scene units; 0: no ray (likewise)"),
+    Channel("light_id", ("light.ID",), False, -1.0,
+            "object ID of that light; -1: none, or the environment (likewise)"),
+    Channel("blocker_distance", ("blocker.Z",), False, 0.0,
+            "from the first hit to what stopped that ray, scene units; 0: nothing did (likewise)"),
+    Channel("blocker_id", ("blocker.ID",), False, -1.0,
+            "object ID of what stopped it; -1: nothing (likewise)"),
     Channel("specular", _rgb("specular"), False, 0.0,
             "part of `indirect` whose first direction a glossy or mirror lobe chose"),
     Channel("hit_distance", ("hit.Z",), False, 0.0,
@@ -82,6 +91,7 @@ CHANNELS = MappingProxyType({row.name: row for row in _ROWS})
 
 RADIANCE = ("color", "emission", "direct", "indirect")
 SPLIT = ("unshadowed", "visibility")
+SHADOW = ("light", "light_id", "blocker_distance", "blocker_id")
 GLOSS = ("specular", "hit_distance", "hit_id", "roughness")
 REPLAY = ("replay", "replay_before")
 GBUFFER = ("albedo", "normal", "position", "depth", "id")

@@ -11,7 +11,7 @@ from scenes import catalog
 
 from . import backend
 from .arguments import parse_size
-from .channels import FRAME, GLOSS, REPLAY, SPLIT
+from .channels import FRAME, GLOSS, REPLAY, SHADOW, SPLIT
 from .errors import InputError
 from .lock import writing
 from .manifest import parse_frames
@@ -35,7 +35,7 @@ frames_option = click.option("--frames", metavar="RANGE",
                              help="As 0:20 (0 to 19), 0:20:2, 7 or 0,5,9; default all.")
 
 
-OFFERED = (*FRAME, *SPLIT, *GLOSS, *REPLAY)
+OFFERED = (*FRAME, *SPLIT, *SHADOW, *GLOSS, *REPLAY)
 
 
 def render_options(command):

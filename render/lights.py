@@ -39,10 +39,19 @@ DELTA = 0.1
 
 @dataclass
 class DirectLight:
-    """The light sample's part of D, and U; radiance, see the module's header."""
+    """The light sample's part of D, and U (radiance, see the module's header); and its shadow ray.
+
+    light: from the surface to the light's point, 0 where no ray was sent. blocker_distance: from
+    the surface to what stopped the ray, 0 if nothing did. light_shape, blocker_shape: index in the
+    JIT registry, 0 for none.
+    """
 
     direct: mi.Color3f
     unshadowed: mi.Color3f
+    light: mi.Vector3f
+    light_shape: mi.UInt32
+    blocker_distance: mi.Float
+    blocker_shape: mi.UInt32
 
 
 @dr.syntax
@@ -82,10 +91,20 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
 
     c, light = contribution(scene, si, picked, jitter, active)
     lit = active & (dr.max(c) > 0)
-    shadowed = scene.ray_test(si.spawn_ray_to(light.p), active=lit)
+    toward = si.spawn_ray_to(light.p)
+    blocker = scene.ray_intersect_preliminary(toward, coherent=False, active=lit)
+    shadowed = blocker.is_valid()
     bsdf_pdf = si.bsdf().pdf(mi.BSDFContext(), si, si.to_local(light.d), lit)
     w = dr.select(light.delta, 1, power_heuristic(light.pdf / emitters, bsdf_pdf))
-    return DirectLight(dr.select(lit & ~shadowed, w * c / p, 0), unshadowed)
+    return DirectLight(
+        dr.select(lit & ~shadowed, w * c / p, 0), unshadowed,
+        dr.select(lit, light.p - si.p, 0), shape_index(light.emitter.get_shape(), lit),
+        dr.select(lit & shadowed, blocker.t, 0), shape_index(blocker.shape, lit & shadowed))
+
+
+def shape_index(shape: mi.ShapePtr, active: mi.Bool) -> mi.UInt32:
+    """Index in the JIT registry, 0 where not `active`."""
+    return dr.select(active, dr.reinterpret_array(mi.UInt32, shape), 0)
 
 
 def contribution(scene: mi.Scene, si: mi.SurfaceInteraction3f, k: mi.UInt32, place: mi.Point2f,

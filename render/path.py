@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import drjit as dr
 
-from .lights import DirectLight, resample_lights
+from .lights import DirectLight, resample_lights, shape_index
 from .mis import power_heuristic
 from .sampler import Sampler
 from .variant import mi
@@ -30,7 +30,8 @@ class Radiance:
     specular: the part of `indirect` that left the first hit through a glossy or mirror lobe.
     hit_distance: from the first hit to the next, 0 if there is none. hit_shape: the shape met
     there, its index in the JIT registry, 0 if there is none.
-    `unshadowed` and `visibility` split direct light, if it was resampled: see `render/lights.py`.
+    `unshadowed`, `visibility` and `shadow_ray` are there if direct light was resampled: see
+    `render/lights.py`.
     """
 
     emission: mi.Color3f
@@ -41,6 +42,7 @@ class Radiance:
     hit_shape: mi.UInt32
     unshadowed: mi.Color3f | None = None
     visibility: mi.Float | None = None
+    shadow_ray: DirectLight | None = None
 
 
 @dr.syntax
@@ -118,7 +120,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         met = active & (depth == 1) & pi.is_valid()
         hit_distance = dr.select(met, pi.t, hit_distance)
-        hit_shape = dr.select(met, dr.reinterpret_array(mi.UInt32, pi.shape), hit_shape)
+        hit_shape = dr.select(met, shape_index(pi.shape, met), hit_shape)
 
     radiance = Radiance(emission, direct, indirect, specular, hit_distance, hit_shape)
     return _with_split(radiance, arrived, split)
@@ -127,6 +129,6 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
 def _with_split(radiance: Radiance, arrived: mi.Color3f, split: DirectLight | None) -> Radiance:
     if split is not None:
         possible = mi.luminance(split.unshadowed)
-        radiance.unshadowed = split.unshadowed
+        radiance.unshadowed, radiance.shadow_ray = split.unshadowed, split
         radiance.visibility = dr.select(possible > 0, mi.luminance(arrived) / possible, 0)
     return radiance

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenes.description import Scene
 
-from .channels import FRAME, GLOSS, RADIANCE, REPLAY, SPLIT
+from .channels import FRAME, GLOSS, RADIANCE, REPLAY, SHADOW, SPLIT
 from .errors import InputError
 from .frame import Frame
 from .gbuffer import GBUFFER, PrimaryHit
@@ -62,7 +62,7 @@ class Renderer:
     @property
     def channels(self) -> tuple[str, ...]:
         """All channels of its frames that are not the same in any scene of this kind."""
-        return (FRAME + (SPLIT if self.direct == "resampled" else ())
+        return (FRAME + (SPLIT + SHADOW if self.direct == "resampled" else ())
                 + (GLOSS if self.stage.glossy else ()))
 
     def frame(self, index: int, seed: int = 0, channels: Sequence[str] = FRAME,
@@ -72,8 +72,8 @@ class Renderer:
         The result depends on (scene, index, seed, size) alone, and the channels of `gradient.py`
         on `previous`, the frame before it (None: there is none).
         """
-        if self.direct != "resampled" and set(channels) & set(SPLIT):
-            raise InputError(f"the channels {' and '.join(SPLIT)} need --direct resampled")
+        if self.direct != "resampled" and set(channels) & {*SPLIT, *SHADOW}:
+            raise InputError(f"the channels {', '.join(SPLIT + SHADOW)} need --direct resampled")
         replayed = replay(self, index, previous, seed) if set(channels) & set(REPLAY) else {}
         self.stage.pose(index)
         planes = self._trace_frame(index, seed, [c for c in channels if c not in REPLAY])
@@ -112,8 +112,9 @@ class Renderer:
             rays = pixel_rays(self.stage, self.height, self.width)
             ray, depth_per_length = rays.at(*self._centres(pixel))
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
+            unit = dr.opaque(mi.Float, self.stage.unit)
             planes = {}
-            if set(channels) & {*RADIANCE, *SPLIT, *GLOSS}:
+            if set(channels) & {*RADIANCE, *SPLIT, *SHADOW, *GLOSS}:
                 sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
                 radiance = trace(scene, ray, pi, sampler, self.scene.max_depth,
                                  self.direct == "resampled")
@@ -125,9 +126,16 @@ class Renderer:
                     "unshadowed": radiance.unshadowed,
                     "visibility": radiance.visibility,
                     "specular": radiance.specular,
-                    "hit_distance": radiance.hit_distance * dr.opaque(mi.Float, self.stage.unit),
+                    "hit_distance": radiance.hit_distance * unit,
                     "hit_id": self.stage.object_id(radiance.hit_shape),
                 }
+                if radiance.shadow_ray is not None:
+                    planes |= {
+                        "light": radiance.shadow_ray.light * unit,
+                        "light_id": self.stage.object_id(radiance.shadow_ray.light_shape),
+                        "blocker_distance": radiance.shadow_ray.blocker_distance * unit,
+                        "blocker_id": self.stage.object_id(radiance.shadow_ray.blocker_shape),
+                    }
             if set(channels) & set(GBUFFER):
                 hit = PrimaryHit(self.stage, pi.compute_surface_interaction(ray), depth_per_length)
                 planes |= {name: GBUFFER[name](hit) for name in channels if name in GBUFFER}

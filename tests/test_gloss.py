@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from test_renderer import small_scene
 
-from render.channels import FRAME, GLOSS, SPLIT
+from render.channels import FRAME, GLOSS
 from render.renderer import Renderer
 from scenes import catalog
 from scenes.description import Rectangle, Shape
@@ -74,5 +74,4 @@ def test_a_mirror_tells_where_its_reflection_is():
 
 def test_frames_carry_what_the_scene_needs():
     assert Renderer(catalog.load("box"), 8, 8).channels == FRAME
-    assert Renderer(catalog.load("box"), 8, 8, direct="resampled").channels == FRAME + SPLIT
     assert Renderer(with_floor(MIRROR), 8, 8).channels == FRAME + GLOSS
