@@ -17,7 +17,7 @@ import numpy as np
 
 from render.frame import Frame
 
-from .reprojection import world_motion
+from .reprojection import world_motions
 from .surface import camera_from_screen
 
 GUIDES = ("normal", "depth", "id")
@@ -45,9 +45,10 @@ def previous_pixel(previous: Frame, current: Frame) -> np.ndarray:
         return source.reshape(h, w)
     ids = np.where(has_surface(current), current["id"], -1).ravel()
     b = camera_from_screen(current)
+    motions = world_motions(previous, current)
     for i in np.unique(ids[ids >= 0]):
-        motion = world_motion(previous.world_from_object[i], current.world_from_object[i])
-        if motion is None or np.linalg.det(motion[:3, :3]) == 0:  # to or from no size at all
+        motion = motions[i]
+        if np.isnan(motion).any() or np.linalg.det(motion[:3, :3]) == 0:  # to or from no size
             continue
         at = np.flatnonzero(ids == i)
         u = np.stack([at % w + 0.5, at // w + 0.5, np.ones(at.size)], axis=-1)

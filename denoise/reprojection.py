@@ -23,6 +23,7 @@ Departure from the assignment: it takes the one nearest pixel and tests the obje
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -60,47 +61,48 @@ def motion_table(previous: Frame, current: Frame) -> np.ndarray:
 
     An object whose matrix is singular, or that only one of the frames has, gets NaN: no history.
     """
-    count = len(current.world_from_object)
-    table = np.full((count, _ROW), np.nan)
-    b = camera_from_screen(current)
     s_previous = np.linalg.inv(camera_from_screen(previous))
-    world_from_camera = np.linalg.inv(current.camera_from_world)
-    for i in range(min(count, len(previous.world_from_object))):
-        motion = world_motion(previous.world_from_object[i], current.world_from_object[i])
-        if motion is None:
-            continue
-        t = previous.camera_from_world @ motion @ world_from_camera
-        moved = not np.array_equal(motion, np.eye(4)) or not _same_view(previous, current)
-        e = s_previous @ t[:3, :3] @ b - np.eye(3) if moved else np.zeros((3, 3))
-        shift = s_previous @ t[:3, 3] if moved else np.zeros(3)
-        table[i, :12] = np.column_stack([e, shift]).ravel()
-        table[i, 12:24] = np.column_stack([_rotation(t[:3, :3]), np.zeros(3)]).ravel()
-        table[i, 24:] = 0
+    b = camera_from_screen(current)
+    motion = world_motions(previous, current)
+    t = previous.camera_from_world @ motion @ np.linalg.inv(current.camera_from_world)
+    moved = (motion != np.eye(4)).any((1, 2)) | (not _same_view(previous, current))
+    table = np.zeros((len(t), _ROW))
+    e = np.where(moved[:, None, None], s_previous @ t[:, :3, :3] @ b - np.eye(3), 0)
+    shift = np.where(moved[:, None], t[:, :3, 3] @ s_previous.T, 0)
+    table[:, :12] = np.concatenate([e, shift[..., None]], 2).reshape(-1, 12)
+    # What normals turn by: the inverse transpose, its scale taken out.
+    with np.errstate(invalid="ignore"):  # of NaN
+        scale = np.cbrt(np.abs(np.linalg.det(t[:, :3, :3])))
+    turn = inverses(t[:, :3, :3]).transpose(0, 2, 1) * scale[:, None, None]
+    table[:, 12:24].reshape(-1, 3, 4)[..., :3] = turn
+    table[np.isnan(table).any(1)] = np.nan
     return table.astype(np.float32)
 
 
-def world_motion(previous: np.ndarray, current: np.ndarray) -> np.ndarray | None:
-    """M' M^-1, exactly the identity for an object at rest; None if M cannot be inverted."""
-    if np.array_equal(previous, current):
-        return np.eye(4)
+def world_motions(previous: Frame, current: Frame) -> np.ndarray:
+    """(objects, 4, 4) M' M^-1, exactly the identity for an object at rest; NaN for one that only
+    one of the frames has or whose M cannot be inverted."""
+    before = np.full(current.world_from_object.shape, np.nan)
+    count = min(len(before), len(previous.world_from_object))
+    before[:count] = previous.world_from_object[:count]
+    motion = before @ inverses(current.world_from_object)
+    motion[(before == current.world_from_object).all((1, 2))] = np.eye(4)
+    return motion
+
+
+def inverses(matrices: np.ndarray) -> np.ndarray:
+    """(n, k, k) inverses, NaN where there is none."""
     try:
-        return previous @ np.linalg.inv(current)
+        return np.linalg.inv(matrices)
     except np.linalg.LinAlgError:
-        return None
+        if len(matrices) == 1:
+            return np.full(matrices.shape, np.nan)
+        return np.concatenate([inverses(matrix[None]) for matrix in matrices])
 
 
 def _same_view(previous: Frame, current: Frame) -> bool:
     return (np.array_equal(previous.camera_from_world, current.camera_from_world)
             and np.array_equal(previous.screen_from_world, current.screen_from_world))
-
-
-def _rotation(a: np.ndarray) -> np.ndarray:
-    """What normals turn by: the inverse transpose, its scale taken out."""
-    try:
-        normal_from_normal = np.linalg.inv(a).T
-    except np.linalg.LinAlgError:
-        return np.full((3, 3), np.nan)
-    return normal_from_normal * np.cbrt(np.abs(np.linalg.det(a)))
 
 
 def load_table(table: np.ndarray, stencil: Stencil) -> Float:
@@ -160,14 +162,18 @@ class Place:
 
 
 def locate(stencil: Stencil, surface: list[Float], table: Float, dual: list[Float],
-           plane_tolerance: Float) -> Place:
-    """Follow each surface back; surface: ID, normal (3), depth. Others as of `motion_between`."""
+           plane_tolerance: Float, shift: Sequence[Float] = (0, 0)) -> Place:
+    """Follow each surface back; surface: ID, normal (3), depth. Others as of `motion_between`.
+
+    Args:
+        shift: follow the point of the surface that many columns and rows away, at that depth.
+    """
     float_t = stencil.Float
     id_, *normal, depth = surface
     known = (id_ >= 0) & (id_ < dr.width(table) // _ROW)
     (ex, tx, ey, ty, ew, tw), rotation = _motion(stencil, table, dr.select(known, id_, 0))
     row, column = stencil.pixel()
-    u = [float_t(column) + 0.5, float_t(row) + 0.5, float_t(1)]
+    u = [float_t(column) + 0.5 + shift[0], float_t(row) + 0.5 + shift[1], float_t(1)]
     inverse_depth = 1 / depth
     dx, dy, dw = (dr.fma(t, inverse_depth, dot(e, u)) for e, t in ((ex, tx), (ey, ty), (ew, tw)))
     scale = 1 + dw

@@ -21,7 +21,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
@@ -261,6 +261,17 @@ class Taps:
     def __len__(self) -> int:
         return len(self.views) or len(self.starts)
 
+    @property
+    def arrays(self) -> list[list[Float]]:
+        """All arrays that a kernel must be given."""
+        return self.views or [self.planes, self.starts]
+
+    def seen_as(self, arrays: list[list[Float]]) -> Taps:
+        """The same taps of arrays that stand for these."""
+        if self.views:
+            return replace(self, views=arrays)
+        return replace(self, planes=arrays[0], starts=arrays[1])
+
     def next(self) -> None:
         """Call at the end of a tap: keeps it apart from the following one while compiling.
 
@@ -284,11 +295,20 @@ class Step:
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        self._frozen = dr.freeze(function, state_fn=_sizes, warn_after=1000)
+        self._function = function
+        self._called_with: tuple[Any, ...] = ()
+        self._frozen = dr.freeze(self._record, state_fn=lambda *_: _sizes(*self._called_with),
+                                 warn_after=1000)
 
     def __call__(self, *arguments: Any) -> Any:
+        self._called_with = arguments
         with _no_collection():
-            return self._frozen(*arguments)
+            # Dr.Jit walks lists twice as fast as it walks dataclasses.
+            return self._frozen(*(a.arrays if isinstance(a, Taps) else a for a in arguments))
+
+    def _record(self, *arguments: Any) -> Any:
+        return self._function(*(a.seen_as(b) if isinstance(a, Taps) else b
+                                for a, b in zip(self._called_with, arguments)))
 
     @property
     def recordings(self) -> int:
