@@ -10,33 +10,41 @@ Parameters were found by measurement: see `tune.py`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import drjit as dr
 
+from render.channels import SHADOW
 from render.frame import Frame
 
 from .atrous import BACKGROUND, LARGEST_LEVELS, LOG2E
-from .history import RecordState, no_history, pack_records
+from .history import RecordState, no_history
 from .innovation import (
     ENERGY_LEVELS,
-    fade_out,
     guided_level,
     look_back,
     merge,
+    pack_history,
     smooth_level,
 )
 from .lanes import OnLanes
 from .parameters import check_positive, check_range, check_whole
 from .reprojection import motion_between, without_images
+from .shadow_motion import (
+    AROUND,
+    CHOICE,
+    has_shadow_rays,
+    read_shadow_rays,
+    shadow_motion,
+)
 from .signals import USED, Signals, check_signals, read_signals
 from .stencil import Float, Planes, Stencil, Step, Taps, window
 from .surface import Surface
 
 _OUTSIDE = -1e15          # 1/z outside the image
-_UNSEEN = -3e14           # 1/z of a pixel without history
 _BLACK = 2 * BACKGROUND   # 1/z of a surface that reflects nothing: a lamp
 _BACKGROUND_SCALE = 1e3   # |k| / sigma_plane of background and lamps, whose like alone count
 
@@ -50,6 +58,7 @@ class FilteredInnovation(OnLanes):
         follow: least share of the smoothed innovation that diffuse light takes, above 0 to 1;
             all of it where frames have no visibility.
         doubt: how many variances of it count as noise.
+        sharp_follow: share of it that visibility and glossy light take.
         smoothing, levels: of diffuse light, levels of the innovation's smoothing, and of the last
             filter while there is no history; the last of these fades out over `fade` frames.
         sharp_smoothing, sharp_levels: the same of visibility and of glossy light.
@@ -59,33 +68,36 @@ class FilteredInnovation(OnLanes):
         min_cosine, plane_tolerance: tests of history, see `reprojection.py`.
         demodulate: filter diffuse light without texture, where frames have albedo.
         gloss: glossy light as a signal of its own, where frames have it.
+        follow_shadows: visibility's history where the shadow was, where frames say.
     """
 
     light_alpha: float = 0.05
-    visibility_alpha: float = 0.2
-    follow: float = 0.4
+    visibility_alpha: float = 0.15
+    follow: float = 0.5
     doubt: float = 4.0
-    smoothing: int = 6
+    sharp_follow: float = 0.7
+    smoothing: int = 5
     levels: int = 4
     sharp_smoothing: int = 3
     sharp_levels: int = 3
-    light_sigma: float = 12.0
-    visibility_sigma: float = 5.0
+    light_sigma: float = 8.0
+    visibility_sigma: float = 4.7
     fade: float = 4.0
-    sigma_plane: float = 0.006
+    sigma_plane: float = 0.005
     longest: float = 64.0
     min_cosine: float = 0.5
     plane_tolerance: float = 0.02
     demodulate: bool = True
     gloss: bool = True
+    follow_shadows: bool = True
 
-    uses: ClassVar[tuple[str, ...]] = USED
+    uses: ClassVar[tuple[str, ...]] = (*USED, *SHADOW)
 
     def __post_init__(self) -> None:
         for name, least in (("smoothing", ENERGY_LEVELS), ("levels", 1)):
             check_whole(self, name, LARGEST_LEVELS, least)
             check_whole(self, f"sharp_{name}", getattr(self, name), least)
-        for name in ("light_alpha", "visibility_alpha", "follow"):
+        for name in ("light_alpha", "visibility_alpha", "follow", "sharp_follow"):
             check_range(self, name, 1e-6, 1.0)
         check_range(self, "doubt", 0.0, 1e6)
         check_range(self, "longest", 1.0, 1e6)
@@ -95,7 +107,7 @@ class FilteredInnovation(OnLanes):
 
     @property
     def reach(self) -> int:
-        return 1 << (max(self.smoothing, self.levels) - 1)
+        return 1 << (max(self.smoothing, self.levels, 1 + max(AROUND)) - 1)
 
     def init_on(self, stencil: Stencil) -> RecordState:
         return RecordState(stencil, no_history(stencil))
@@ -106,30 +118,38 @@ class FilteredInnovation(OnLanes):
         stencil = state.stencil
         table, dual = motion_between(state.previous or frame, frame, stencil)
         signals = read_signals(frame, color, stencil, self.demodulate, self.gloss)
-        works = state.works or Works.make(self, stencil, signals.sizes)
-        check_signals(frame, works.sizes, signals.sizes)
+        rays = None
+        if self.follow_shadows and signals.unshadowed and has_shadow_rays(frame):
+            rays = read_shadow_rays(frame, state.previous or frame, stencil)
+        works = state.works or Works.make(self, stencil, signals.sizes, rays is not None)
+        check_signals(frame, (works.sizes, works.shadows), (signals.sizes, rays is not None))
         signal = [plane for part in signals.parts for plane in part]
         near = [surface.id, *surface.normal, surface.depth]
         inverse_depth, plane = self._guides(surface, signals, stencil)
-        dr.eval(signal, near, inverse_depth, plane)
-        works.depths.store([inverse_depth])
+        guides, id_ = [inverse_depth, *plane], stencil.Float(surface.id)
+        dr.eval(signal, near, guides, id_, (rays.hits, surface.position) if rays else [])
 
         limits = [stencil.opaque(x) for x in (self.min_cosine, self.plane_tolerance, self.longest)]
-        innovation, energies, carried = works.look_back(signal, near, [table], dual,
-                                                        [state.records], limits)
-        works.seen.store(works.hide([inverse_depth], carried[:1]))
-        smooth, energies = works.smooth(innovation, energies, plane)
+        works.surfaces.store([inverse_depth, id_])
+        shadows = []
+        if rays:
+            shadows = works.smooth(works.around, works.shadow_motion(
+                rays.hits, near, surface.position, rays.table, rays.matrices), plane)
+        innovation, energies, carried, seen, other = works.look_back(
+            signal, near, guides, [table], dual, [state.records], shadows, limits)
+        works.surfaces.store(seen)
+        smooth, energies = works.smooth_innovation(innovation, energies, other, plane)
         # Without visibility apart, diffuse light has the shadows in it, which are quick.
         follow = self.follow if signals.unshadowed else 1.0
         numbers = [stencil.opaque(x) for x in (
-            follow, self.doubt, *_each(works.sizes, self.light_alpha, self.visibility_alpha))]
-        histories, noises = works.merge(signal, innovation, smooth, energies, carried,
-                                        [inverse_depth, *plane], numbers)
-        sigmas = [stencil.opaque(LOG2E / x) for x in _each(works.sizes, self.light_sigma,
+            follow, self.doubt, self.sharp_follow, self.fade,
+            *_each(works.sizes, self.light_alpha, self.visibility_alpha))]
+        values, fade = works.merge(signal, innovation, smooth, energies, carried, other,
+                                   guides, numbers)
+        sigmas = [stencil.opaque(math.sqrt(LOG2E) / x) for x in _each(works.sizes, self.light_sigma,
                                                            self.visibility_sigma)]
-        fade = works.fade(carried[:1], [stencil.opaque(self.fade)])
-        values = _interleave(works.sizes, histories, noises)
-        parts = works.filter(values, plane, [fade], sigmas)
+        works.surfaces.store([inverse_depth])
+        parts = works.filter(values, plane, fade, sigmas)
         records = works.pack(near, carried[:1], values)
         return signals.color(parts), replace(state, works=works, records=records,
                                             previous=without_images(frame))
@@ -149,75 +169,92 @@ class FilteredInnovation(OnLanes):
 
 @dataclass(frozen=True)
 class Level:
-    """A pass over the first planes: taps of values and of 1/z, and the recorded step."""
+    """A pass over the first planes: taps of values and of surfaces, and the recorded step."""
 
     taps: tuple[Taps, Taps]
     spacing: Float
     step: Step
 
     @staticmethod
-    def make(i: int, values: Planes, count: int, depths: Planes,
+    def make(i: int, values: Planes, count: int, surfaces: Planes,
              function: Callable[..., list[Float]]) -> Level:
         offsets = [(dy << i, dx << i) for dy, dx in (*window(1), (0, 0))]
-        return Level((values.taps(offsets, count), depths.taps(offsets)),
+        return Level((values.taps(offsets, count), surfaces.taps(offsets)),
                      values.stencil.opaque(1 << i), Step(function))
 
 
 @dataclass(frozen=True)
 class Works:
-    """Planes and steps for signals of these sizes.
+    """Planes and steps for signals of these sizes, and for shadow rays or without.
 
-    depths: 1/z of all surfaces. seen: where there is history. values: what is being filtered, in
+    surfaces: 1/z (of what has a history, then of all) and ID. values: what is being filtered, in
     the order of leaving: diffuse light goes through all levels, the sharp signals through fewer,
-    energies through the first ones.
+    energies through the first ones. around: how a shadow's motion spreads.
     """
 
     sizes: tuple[int, ...]
-    depths: Planes
-    seen: Planes
+    shadows: bool
+    surfaces: Planes
     values: Planes
+    around: list[Level]
     smoothing: list[Level]
     levels: list[Level]
+    shadow_motion: Step
     look_back: Step
-    hide: Step
     merge: Step
-    fade: Step
     pack: Step
 
     @staticmethod
-    def make(method: FilteredInnovation, stencil: Stencil, sizes: tuple[int, ...]) -> Works:
-        depths, seen = (stencil.planes([_OUTSIDE]) for _ in range(2))
-        values = stencil.planes([0.0] * (1 + sum(sizes) + len(sizes)))
+    def make(method: FilteredInnovation, stencil: Stencil, sizes: tuple[int, ...],
+             shadows: bool) -> Works:
+        surfaces = stencil.planes([_OUTSIDE, -1.0])
+        leaving = [(1 + sizes[0], method.smoothing), (int(shadows), CHOICE),
+                   (sum(sizes[1:]) + int(shadows), method.sharp_smoothing),
+                   (len(sizes), ENERGY_LEVELS)]
+        values = stencil.planes([0.0] * sum(planes for planes, _ in leaving))
 
         def smoothing(i: int) -> Level:
-            count = 1 + sum(sizes if i < method.sharp_smoothing else sizes[:1])
-            count += len(sizes) if i < ENERGY_LEVELS else 0
-            return Level.make(i, values, count, seen, smooth_level)
+            count = sum(planes for planes, levels in leaving if i < levels)
+            return Level.make(i, values, count, surfaces, lambda *a: smooth_level(1, *a))
+
+        def around(i: int) -> Level:
+            return Level.make(i, values, 3, surfaces, lambda *a: smooth_level(0, *a))
 
         def last(i: int) -> Level:
             some = sizes if i < method.sharp_levels else sizes[:1]
             fading = (i == method.levels - 1, *[i == method.sharp_levels - 1] * (len(some) - 1))
-            return Level.make(i, values, sum(some) + len(some), depths,
+            return Level.make(i, values, sum(some) + len(some), surfaces,
                               lambda *a: guided_level(some, fading, *a))
 
-        def pack(near: list[Float], length: list[Float], values: list[Float]) -> Float:
-            return pack_records(stencil, near, [*length, *values])
+        return Works(
+            sizes, shadows, surfaces, values, [around(i) for i in AROUND],
+            [smoothing(i) for i in range(method.smoothing)],
+            [last(i) for i in range(method.levels)],
+            Step(lambda *a: shadow_motion(stencil, *a)),
+            Step(lambda *a: look_back(stencil, sizes, *a)),
+            Step(lambda *a: merge(stencil, sizes, *a)),
+            Step(lambda *a: pack_history(stencil, sizes, *a)))
 
-        return Works(sizes, depths, seen, values,
-                     [smoothing(i) for i in range(method.smoothing)],
-                     [last(i) for i in range(method.levels)],
-                     Step(lambda *a: look_back(stencil, sizes, *a)), Step(_hide),
-                     Step(lambda *a: merge(stencil, sizes, *a)), Step(fade_out), Step(pack))
-
-    def smooth(self, innovation: list[Float], energies: list[Float],
-               plane: list[Float]) -> tuple[list[Float], list[Float]]:
-        """Q of the first signal and S of the innovation, and W of its energies."""
-        values = [energies[0], *innovation, *energies]
-        for level in self.smoothing:
+    def smooth(self, levels: list[Level], values: list[Float], plane: list[Float]) -> list[Float]:
+        """Values after these levels, of which later ones may be of the first values alone."""
+        values = list(values)
+        for level in levels if values else []:
             count = len(level.taps[0].at(0))
             self.values.store(values[:count], gutters=True)
             values[:count] = level.step(*level.taps, plane, [level.spacing])
-        return values[:1 + len(innovation)], values[1 + len(innovation):]
+        return values
+
+    def smooth_innovation(self, innovation: list[Float], energies: list[Float], other: list[Float],
+                          plane: list[Float]) -> tuple[list[Float], list[Float]]:
+        """Q of the first signal, S of the innovation and of the other one; W of its energies."""
+        first = self.sizes[0]
+        e, excess = other[:1], other[2:]
+        values = self.smooth(self.smoothing, [energies[0], *innovation[:first], *excess,
+                                              *innovation[first:], *e, *energies], plane)
+        end = len(values) - len(energies)
+        smooth = [*values[:1 + first], *values[1 + first + len(excess):end - len(e)],
+                  *values[1 + first:1 + first + len(excess)], *values[end - len(e):end]]
+        return smooth, values[end:]
 
     def filter(self, values: list[Float], plane: list[Float], fade: list[Float],
                sigmas: list[Float]) -> list[list[Float]]:
@@ -234,17 +271,3 @@ class Works:
 def _each(sizes: tuple[int, ...], light: Any, visibility: Any) -> list[Any]:
     """A parameter of each signal, light or visibility."""
     return [light if size == 3 else visibility for size in sizes]
-
-
-def _interleave(sizes: tuple[int, ...], planes: list[Float], noises: list[Float]) -> list[Float]:
-    """Each signal's planes, followed by its variance."""
-    ordered, at = [], 0
-    for size, noise in zip(sizes, noises):
-        ordered += [*planes[at:at + size], noise]
-        at += size
-    return ordered
-
-
-def _hide(inverse_depth: list[Float], length: list[Float]) -> list[Float]:
-    """1/z, far away where there is no history."""
-    return [dr.select(length[0] > 1.5, inverse_depth[0], _UNSEEN)]

@@ -57,9 +57,11 @@ class RecordState:
 
 
 def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosine: Float,
-            fallback: bool) -> tuple[list[Float], Any]:
+            fallback: bool = False, wanted: Any = None) -> tuple[list[Float], Any]:
     """The first `count` values of the previous frame's records where each pixel's surface was.
 
+    Args:
+        wanted: mask of the pixels that ask, if they are few; the others get no history.
     Returns:
         `count` arrays, 0 where there is no history, and the mask of where there is.
     """
@@ -83,13 +85,21 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
 
     left, top = dr.floor(place.x - 0.5), dr.floor(place.y - 0.5)
     fx, fy = place.x - 0.5 - left, place.y - 0.5 - top
-    sums, total = [float_t(0)] * count, float_t(0)
-    for dy in (0, 1):
-        for dx in (0, 1):
-            values, passes = tap(int_t(left) + dx, int_t(top) + dy)
-            weight = dr.select(passes, (fx if dx else 1 - fx) * (fy if dy else 1 - fy), 0)
-            sums = [dr.fma(weight, v, s) for v, s in zip(values, sums)]
-            total += weight
+
+    def corner(dy: Any, dx: Any) -> tuple[Float, list[Float]]:
+        values, passes = tap(int_t(left) + dx, int_t(top) + dy)
+        return dr.select(passes, _share(fx, dx) * _share(fy, dy), 0), values
+
+    if wanted is None:
+        sums, total = [float_t(0)] * count, float_t(0)
+        for dy in (0, 1):
+            for dx in (0, 1):
+                weight, values = corner(dy, dx)
+                sums = [dr.fma(weight, v, s) for v, s in zip(values, sums)]
+                total += weight
+    else:
+        total, sums = weighted_sums(stencil, wanted & place.inside, 4, count,
+                                    lambda i: corner(i >> 1, i & 1))
     if fallback:
         lacking = place.inside & (total < LEAST_WEIGHT)
 
@@ -104,6 +114,12 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
     found = place.inside & (total >= LEAST_WEIGHT)
     scale = dr.select(found, 1 / dr.select(found, total, 1), 0)
     return [s * scale for s in sums], found
+
+
+def _share(fraction: Float, which: Any) -> Float:
+    """Weight of the first (0) or the second (1) of two neighbours."""
+    return dr.abs(fraction - 1 + which) if isinstance(which, int) else dr.abs(
+        fraction - 1 + type(fraction)(which))
 
 
 def _record(stencil: Stencil, records: Float, lane: Any, count: int) -> list[Float]:

@@ -15,18 +15,23 @@ of S[e]'s variance (as White's 1980 of a regression's):
 
     h <- h + f S[e] + a (e - S[e])
 
+The sharp signals, visibility and glossy light, take a fixed share f of theirs.
+
     s^2 <- (1 - a)^2 s^2 + a^2 s_0^2,   s_0^2 = max(W[l(e)^2] - s^2, W[l(e)^2] / 4)
 
 with W the first `ENERGY_LEVELS` levels of S: unlike the variance of d in a window, that of e has
 no shadow's edge in it that stands still. Without history s_0^2 is the variance of l(d) over the
 pixels of the surface in a 5x5 window.
 
+Visibility has two histories, where the surface was and where its shadow was: `shadow_motion.py`.
+
 A smoothing is a-trous levels of 3x3 taps, h = {1/4, 1/2, 1/4}^2, 2^i pixels apart. The last filter
 of h compares luminance too,
 
-    w = h exp(-distance(q, p's plane) / (sigma_plane z(p)) - |l(p) - l(q)| / (sigma s))
+    w = h exp(-distance(q, p's plane) / (sigma_plane z(p)) - ((l(p) - l(q)) / (sigma s))^2)
 
-and its last level fades out as the history grows. Normals are not compared: where they differ much
+and its last level fades out as the history grows. A pixel of another object counts for a quarter.
+Normals are not compared: where they differ much
 the tangent plane is soon left, and at a crease, or on a leaf, a neighbour turned away is a better
 guess than one sample (+0.2 to 0.9 dB for normal_power 0 instead of 4 and 128).
 
@@ -44,16 +49,19 @@ import drjit as dr
 
 from .atrous import EPSILON, LOG2E
 from .exponential import exp2
-from .history import look_up
+from .history import look_up, pack_records
 from .reprojection import locate
+from .shadow_motion import look_up_shadow
 from .sparse import tabulate, weighted_sums, window_taps
 from .stencil import Float, Offset, Stencil, Taps, window
 
 BINOMIAL = {0: 1 / 2, 1: 1 / 4}
 ENERGY_LEVELS = 2
 LEAST_NOISE = 0.25    # share of the innovation's energy that is at least noise of d
+STRANGER = 0.25       # weight of a pixel of another object, beside its distance
 RADIUS = 2            # pixels, of the window of the spatial variance
 _NEVER = -1e3         # log2 of a weight that is 0
+_UNSEEN = -3e14       # 1/z of a pixel without history
 _MOST = 1e36          # squares of luminance stay below: sums of them must not overflow
 _LEAST = 1e-20        # square of a luminance that is taken for 0
 
@@ -64,21 +72,25 @@ def luma(size: int) -> int:
 
 
 def look_back(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], surface: list[Float],
-              table: list[Float], dual: list[Float], records: list[Float],
-              numbers: list[Float]) -> tuple[list[Float], list[Float], list[Float]]:
+              guides: list[Float], motion: list[Float], dual: list[Float], records: list[Float],
+              shadows: list[Float], numbers: list[Float]) -> tuple[list[Float], ...]:
     """The innovation.
 
     Args:
-        signal: planes of all signals. surface: ID, normal (3), depth. numbers: min_cosine,
-            plane_tolerance, longest. The rest as for `history.look_up`, whose records hold n, then
-            each signal's planes and variance.
+        signal: planes of all signals. surface: ID, normal (3), depth. guides: 1/z, its slopes (2)
+            and scale. motion, dual: of `motion_between`. records: of `pack_history`.
+            shadows: of `shadow_motion`, smoothed, or empty. numbers: min_cosine,
+            plane_tolerance, longest.
     Returns:
-        e, 0 without history; l(e)^2 a signal; n, then s^2 of each signal's history.
+        e, 0 without history; l(e)^2 a signal; n, then s^2 of each signal's history; 1/z, far away
+        without history; and, with `shadows`, e and s^2 of visibility's other history, and how much
+        greater its e^2 is.
     """
     min_cosine, tolerance, longest = numbers
-    place = locate(stencil, surface, table[0], dual, tolerance)
-    (length, *old), found = look_up(stencil, place, records[0], 1 + len(signal) + len(sizes),
-                                    min_cosine, fallback=False)
+    place = locate(stencil, surface, motion[0], dual, tolerance)
+    count, last = 1 + len(signal) + len(sizes), sizes[-1] + 1
+    words, found = look_up(stencil, place, records[0], count, min_cosine)
+    length, old = words[last], [*words[last + 1:], *words[:last]]
     innovation, energies, variances, at = [], [], [], 0
     for s, size in enumerate(sizes):
         history = old[at + s:at + s + size]
@@ -88,80 +100,108 @@ def look_back(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], sur
         variances.append(old[at + s + size])
         at += size
     length = dr.select(found, dr.minimum(length + 1, longest), 1)
-    return innovation, energies, [length, *variances]
+    seen, other = [dr.select(found, guides[0], _UNSEEN)], []
+    if shadows:
+        (v, variance), moves = look_up_shadow(stencil, surface, guides, motion, dual, records[0],
+                                              shadows, [min_cosine, tolerance])
+        moves &= found
+        e = dr.select(moves, signal[-1] - v, innovation[-1])
+        other = [e, dr.select(moves, variance, variances[-1]), dr.square(e) - energies[-1]]
+    return innovation, energies, [length, *variances], seen, other
 
 
-def smooth_level(values: Taps, depths: Taps, plane: list[Float],
+def pack_history(stencil: Stencil, sizes: tuple[int, ...], surface: list[Float],
+                 length: list[Float], values: list[Float]) -> Float:
+    """Records of a frame; values: planes and variance of each signal.
+
+    The last signal comes first: visibility is looked up alone.
+    """
+    last = sizes[-1] + 1
+    return pack_records(stencil, surface, [*values[-last:], *length, *values[:-last]])
+
+
+def smooth_level(spreads: int, values: Taps, surfaces: Taps, plane: list[Float],
                  spacing: list[Float]) -> list[Float]:
-    """One level of S, before which stands one of Q. The last tap is the pixel itself.
+    """One level of S, before which stand some of Q. The last tap is the pixel itself.
 
     Args:
-        values: what Q is of, then what S is of.
-        depths: 1/z, far away where a pixel has no history, so that it does not count.
+        spreads: how many of Q. values: what Q is of, then what S is of.
+        surfaces: 1/z, far away where a pixel has no history, so that it does not count; ID.
         plane: slope of 1/z by column and row, scale of a difference of 1/z.
         spacing: pixels between taps.
     """
-    exponent = plane_exponent(depths, plane, *spacing)
+    exponent = surface_exponent(surfaces, plane, *spacing)
     h0 = BINOMIAL[0]**2
     center = values.at(-1)
-    total, sums = type(plane[0])(h0), [v * h0 for v in center[1:]]
-    variance = center[0] * h0**2
+    total, sums = type(plane[0])(h0), [v * h0 for v in center[spreads:]]
+    variances = [v * h0**2 for v in center[:spreads]]
     for i, offset in enumerate(window(1)):
         w = exp2(exponent(i, offset))
         tap = values.at(i)
-        sums = [dr.fma(w, v, s) for v, s in zip(tap[1:], sums)]
-        variance = dr.fma(w * w, tap[0], variance)
+        sums = [dr.fma(w, v, s) for v, s in zip(tap[spreads:], sums)]
+        variances = [dr.fma(w * w, v, s) for v, s in zip(tap, variances)]
         total += w
         values.next()
     norm = 1 / total
-    return [variance * dr.square(norm), *(s * norm for s in sums)]
+    return [*(v * dr.square(norm) for v in variances), *(s * norm for s in sums)]
 
 
-def plane_exponent(depths: Taps, plane: list[Float],
-                   spacing: Float) -> Callable[[int, Offset], Float]:
-    """Function of (tap, offset): log2 of h times the weight of the distance from p's plane."""
+def surface_exponent(surfaces: Taps, plane: list[Float],
+                     spacing: Float) -> Callable[[int, Offset], Float]:
+    """Function of (tap, offset): log2 of h times the weight of the distance from p's plane, and
+    of being another object."""
     gx, gy, scale = plane[0] * spacing, plane[1] * spacing, plane[2] * LOG2E
-    (inverse_depth,) = depths.at(-1)
+    inverse_depth, id_ = surfaces.at(-1)
 
     def exponent(i: int, offset: Offset) -> Float:
         dy, dx = offset
+        tap_inverse_depth, tap_id = surfaces.at(i)
         expected = dr.fma(gx, float(dx), dr.fma(gy, float(dy), inverse_depth))
         log2_h = math.log2(BINOMIAL[abs(dy)] * BINOMIAL[abs(dx)])
-        return dr.fma(dr.abs(depths.at(i)[0] - expected), -scale, log2_h)
+        same = dr.select(tap_id == id_, type(scale)(log2_h), log2_h + math.log2(STRANGER))
+        return dr.fma(dr.abs(tap_inverse_depth - expected), -scale, same)
 
     return exponent
 
 
 def merge(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], innovation: list[Float],
-          smooth: list[Float], energies: list[Float], carried: list[Float], guides: list[Float],
-          numbers: list[Float]) -> tuple[list[Float], list[Float]]:
-    """The new history and its variance, a signal's planes and its s^2 each.
+          smooth: list[Float], energies: list[Float], carried: list[Float], other: list[Float],
+          guides: list[Float], numbers: list[Float]) -> tuple[list[Float], list[Float]]:
+    """The new history, a signal's planes and its s^2 each; and how the last filter fades out.
 
     Args:
-        smooth: Q, then S[e]. energies: W[l(e)^2]. carried: n and s^2 as from `look_back`.
-        guides: 1/z, its slopes (2) and scale, of all pixels. numbers: g, k, and each signal's
-            alpha.
+        smooth: Q, then S[e], and of what is in `other` how much greater e^2 is, and e.
+        energies: W[l(e)^2]. carried, other: as from `look_back`.
+        guides: 1/z, its slopes (2) and scale, of all pixels. numbers: g, k, f of the sharp
+            signals, frames until the filter has faded, and each signal's alpha.
     """
     length, *variances = carried
     spread, *smooth = smooth
-    least, doubt, *alphas = numbers
+    if other:
+        *smooth, excess, wide_other = smooth
+        better = excess < 0
+        innovation = [*innovation[:-1], dr.select(better, other[0], innovation[-1])]
+        smooth[-1] = dr.select(better, wide_other, smooth[-1])
+        variances[-1] = dr.select(better, other[1], variances[-1])
+        energies = [*energies[:-1], dr.maximum(energies[-1] + dr.minimum(excess, 0), 0)]
+    least, doubt, sharp, frames, *alphas = numbers
     new = length < 1.5
     first = spatial_variances(stencil, sizes, signal, new, guides)
-    histories, noises, at = [], [], 0
+    values, at = [], 0
     for s, size in enumerate(sizes):
         a = dr.maximum(1 / length, alphas[s])
         e, wide = innovation[at:at + size], smooth[at:at + size]
-        follow: Any = 1
+        follow = dr.maximum(sharp, a)
         if s == 0:
             certain = 1 - doubt * spread / dr.maximum(dr.square(wide[luma(size)]), _LEAST)
             follow = dr.maximum(dr.maximum(certain, least), a)
-        histories += [dr.fma(follow - a, y, dr.fma(a - 1, x, d))
-                      for d, x, y in zip(signal[at:at + size], e, wide)]
+        values += [dr.fma(follow - a, y, dr.fma(a - 1, x, d))
+                   for d, x, y in zip(signal[at:at + size], e, wide)]
         noise = dr.select(new, first[s], dr.maximum(energies[s] - variances[s],
                                                     energies[s] * LEAST_NOISE))
-        noises.append(dr.fma(dr.square(1 - a), variances[s], dr.square(a) * noise))
+        values.append(dr.fma(dr.square(1 - a), variances[s], dr.square(a) * noise))
         at += size
-    return histories, noises
+    return values, [_fade_out(length, frames)]
 
 
 def spatial_variances(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], wanted: Any,
@@ -191,16 +231,18 @@ def spatial_variances(stencil: Stencil, sizes: tuple[int, ...], signal: list[Flo
     return [dr.minimum(dr.select(v > 0, v, 0), _MOST) for v in variances]
 
 
-def guided_level(sizes: tuple[int, ...], fading: tuple[bool, ...], values: Taps, depths: Taps,
+def guided_level(sizes: tuple[int, ...], fading: tuple[bool, ...], values: Taps,
+                 surfaces: Taps,
                  plane: list[Float], spacing: list[Float], fade: list[Float],
                  sigmas: list[Float]) -> list[Float]:
     """One level of the last filter over the signals of these sizes, each with its variance.
 
     Args:
         values: planes, a signal's and its variance each. fading: which signals' taps get weaker
-            by log2 of `fade`. sigmas: log2(e) / sigma of each signal. Others as `smooth_level`.
+            by log2 of `fade`. sigmas: sqrt(log2(e)) / sigma of each signal. Others as of
+            `smooth_level`.
     """
-    exponent = plane_exponent(depths, plane, *spacing)
+    exponent = surface_exponent(surfaces, plane, *spacing)
     center, h0 = values.at(-1), BINOMIAL[0]**2
     starts = [sum(sizes[:s]) + s for s in range(len(sizes))]
     sums = [v * h0 for v in center]
@@ -213,7 +255,8 @@ def guided_level(sizes: tuple[int, ...], fading: tuple[bool, ...], values: Taps,
         tap, e = values.at(i), exponent(i, offset)
         for s, (start, size) in enumerate(zip(starts, sizes)):
             at = start + luma(size)
-            x = dr.fma(dr.abs(tap[at] - center[at]), -scales[s], e)
+            distance = (tap[at] - center[at]) * scales[s]
+            x = dr.fma(distance, -distance, e)
             w = exp2(x + fade[0] if fading[s] else x)
             totals[s] += w
             for c in range(start, start + size):
@@ -228,7 +271,7 @@ def guided_level(sizes: tuple[int, ...], fading: tuple[bool, ...], values: Taps,
     return sums
 
 
-def fade_out(length: list[Float], frames: list[Float]) -> Float:
+def _fade_out(length: Float, frames: Float) -> Float:
     """log2 of 1 - (n - 1) / frames, which falls from 1 to 0."""
-    left = 1 - (length[0] - 1) / frames[0]
+    left = 1 - (length - 1) / frames
     return dr.select(left > 1e-6, dr.log2(dr.maximum(left, 1e-6)), _NEVER)

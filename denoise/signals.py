@@ -99,8 +99,8 @@ def read_signals(frame: Frame, color: list[Float], stencil: Stencil, demodulate:
     return Signals([_with_luminance(light), *parts], unshadowed, texture, gloss)
 
 
-def check_signals(frame: Frame, before: tuple[int, ...], now: tuple[int, ...]) -> None:
-    """InputError where a frame splits into other signals than the one before it."""
+def check_signals(frame: Frame, before: tuple, now: tuple) -> None:
+    """InputError where a frame has other signals than the one before it."""
     if before != now:
         raise InputError(f"frame {frame.index} has other channels than the frame before it: "
                          "render the sequence anew with one set of --channels")

@@ -56,16 +56,18 @@ def camera_from_screen(frame: Frame) -> np.ndarray:
     Raises:
         InputError: the frame's matrices are not those of a pinhole camera.
     """
-    screen_from_camera = _screen_from_camera(frame)
     try:
-        return np.linalg.inv(screen_from_camera)
+        return np.linalg.inv(screen_from_camera(frame))
     except np.linalg.LinAlgError:
         raise InputError(f"the matrices of frame {frame.index} do not project to a screen: "
                          "screen_from_world is singular") from None
 
 
-def _screen_from_camera(frame: Frame) -> np.ndarray:
-    """Rows x, y and depth; a pinhole at the camera's origin has no fourth column."""
+def screen_from_camera(frame: Frame) -> np.ndarray:
+    """B^-1, (3, 3) float64: rows x, y and depth of u.
+
+    A pinhole at the camera's origin has no fourth column.
+    """
     try:
         world_from_camera = np.linalg.inv(frame.camera_from_world)
     except np.linalg.LinAlgError:
@@ -123,8 +125,10 @@ def repair(color: np.ndarray, id_: np.ndarray) -> np.ndarray:
     object in a 3x3 window, or 5x5, 7x7, up to 17x17 until there is one; 0 if there is none.
     A bad pixel so stays one pixel, and no kernel needs to know of it.
     """
-    if color.min() >= -LARGEST and color.max() <= LARGEST:  # false for NaN
-        return color
+    flat = color.ravel()
+    with np.errstate(over="ignore", invalid="ignore"):
+        if np.dot(flat, flat) <= LARGEST**2:  # false for NaN; quicker than to compare
+            return color
     good = np.asarray((np.abs(color) <= LARGEST).all(axis=2))
     repaired = np.where(good[..., None], color, 0)
     y, x = np.nonzero(~good)

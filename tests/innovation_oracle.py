@@ -45,18 +45,19 @@ def kind_of(frame: Frame) -> np.ndarray:
 
 def geometry(p: Pixels, q: Pixels, dy: int, dx: int, m) -> np.ndarray:
     distance = np.where(p.kind == 2, plane_weight_distance(p, q) / m.sigma_plane, 0)
-    w = H[abs(dy)] * H[abs(dx)] * np.exp(-distance)
+    w = H[abs(dy)] * H[abs(dx)] * np.exp(-distance) * np.where(p.id == q.id, 1, 0.25)
     return np.where(p.kind == q.kind, w, 0)
 
 
 def pixels_of(frame: Frame, **more: np.ndarray) -> Pixels:
-    return oracles.read(frame, kind=kind_of(frame), **more)
+    return oracles.read(frame, kind=kind_of(frame), id=frame["id"], **more)
 
 
-def smooth(frame: Frame, image: np.ndarray, counts: np.ndarray, levels: int, m) -> np.ndarray:
+def smooth(frame: Frame, image: np.ndarray, counts: np.ndarray, levels: int, m,
+           first: int = 0) -> np.ndarray:
     """S: levels over the pixels that count."""
     shape = frame["id"].shape
-    for i in range(levels):
+    for i in range(first, first + levels):
         pixels = pixels_of(frame, x=image, counts=counts)
         total = np.zeros_like(image)
         weights = np.zeros((*shape, 1))
@@ -105,8 +106,8 @@ def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, s
                     continue
                 w = geometry(p, q, dy, dx, m)
                 if dy or dx:
-                    w = w * p.fade * np.exp(-np.abs(lum(q.x) - lum(p.x))
-                                            / (sigma * (np.sqrt(p.v) + 1e-6)))
+                    deviations = (lum(q.x) - lum(p.x)) / (np.sqrt(p.v) + 1e-6)
+                    w = w * p.fade * np.exp(-(deviations / sigma) ** 2)
                 total[where] += w[..., None] * q.x
                 squares[where] += w * w * q.v
                 weights[where] += w
@@ -137,12 +138,66 @@ def look_up(previous: Frame, frame: Frame, image: np.ndarray, m) -> tuple:
     return np.where(found[..., None], history, 0), found
 
 
+def shadow_shift(previous: Frame, frame: Frame) -> np.ndarray:
+    """(h, w, 2) pixels by which each pixel's shadow was elsewhere; NaN if it was not.
+
+    In world space: the object that the shadow falls on stands still, lights and blockers move.
+    """
+    h, w = frame["id"].shape
+    shift = np.full((h, w, 2), np.nan)
+
+    def seen(surface: int, object_: int, point: np.ndarray) -> np.ndarray:
+        """Where a point of an object was in the frame before, as the surface saw it."""
+        motion = np.eye(4)
+        for i, back in ((object_, True), (surface, False)):
+            if i >= 0:
+                m = previous.world_from_object[i] @ np.linalg.inv(frame.world_from_object[i])
+                motion = (m if back else np.linalg.inv(m)) @ motion
+        return (motion @ [*point, 1])[:3]
+
+    for y, x in np.argwhere((frame["id"] >= 0) & (frame["blocker_distance"] > 0)):
+        i, position = frame["id"][y, x], frame["position"][y, x].astype(float)
+        n, light = frame["normal"][y, x].astype(float), frame["light"][y, x].astype(float)
+        share = frame["blocker_distance"][y, x] / np.linalg.norm(light)
+        source = seen(i, int(frame["light_id"][y, x]), position + light)
+        blocker = seen(i, int(frame["blocker_id"][y, x]), position + share * light)
+        t = n @ (position - source) / (n @ (blocker - source))
+        was = frame.screen_from_world @ [*(source + t * (blocker - source)), 1]
+        d = was[:2] / was[3] - [x + 0.5, y + 0.5]
+        if t > 1 and was[3] > 0 and 0.05 < np.abs(d).sum() < w / 4:
+            shift[y, x] = d
+    return shift
+
+
+def shadow_history(previous: Frame, frame: Frame, image: np.ndarray, m) -> tuple:
+    """What `look_up` finds where the shadow was, and where it finds it."""
+    shift = shadow_shift(previous, frame)
+    moves = np.isfinite(shift).all(-1, keepdims=True)
+    around = smooth(frame, np.concatenate([moves, np.where(moves, shift, 0)], -1),
+                    np.ones(frame["id"].shape), 1, m, first=2)
+    near = (around[..., 0] > 1e-3) & (kind_of(frame) == 2)  # a lamp has no shadow
+    shift = np.where(near[..., None], around[..., 1:] / np.maximum(around[..., :1], 1e-3), 0)
+    position = frame["position"].astype(float)
+    eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
+    for y, x in np.argwhere(near & (frame["id"] >= 0)):  # on the tangent plane
+        column, row = shift[y, x] + [x + 0.5, y + 0.5]
+        on_screen = np.linalg.inv(frame.screen_from_world) @ [column, row, 1, 1]
+        ray = on_screen[:3] / on_screen[3] - eye
+        n = frame["normal"][y, x].astype(float)
+        position[y, x] = eye + ray * (n @ (position[y, x] - eye)) / (n @ ray)
+    moved = Frame(frame.index, {**frame.images, "position": position}, frame.camera_from_world,
+                  frame.screen_from_world, frame.world_from_object)
+    history, found = look_up(previous, moved, image, m)
+    return history, found & near
+
+
 def run(frames: list[Frame], m) -> np.ndarray:
     """The colour of the last frame."""
     settings = {"L": (m.light_alpha, m.smoothing, m.levels, m.light_sigma),
                 "G": (m.light_alpha, m.sharp_smoothing, m.sharp_levels, m.light_sigma),
                 "V": (m.visibility_alpha, m.sharp_smoothing, m.sharp_levels, m.visibility_sigma)}
     kept: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    energy = np.zeros(0)
     length, previous, out = np.zeros(0), None, {}
     for frame in frames:
         found = np.zeros(frame["id"].shape, bool)
@@ -162,7 +217,18 @@ def run(frames: list[Frame], m) -> np.ndarray:
                 energy = smooth(frame, lum(e)[..., None] ** 2, found, 2, m)[..., 0]
                 noise = np.where(found, np.maximum(energy - s2, energy / 4), noise)
             a = np.maximum(1 / n, alpha)
-            wide, follow = smooth(frame, e, found, smoothing, m), np.ones_like(a)
+            wide, follow = smooth(frame, e, found, smoothing, m), np.maximum(m.sharp_follow, a)
+            if name == "V" and previous is not None and m.follow_shadows and "light" in frame:
+                both = np.concatenate([kept[name][0], kept[name][1][..., None]], -1)
+                both, moves = shadow_history(previous, frame, both, m)
+                moves &= found
+                other = np.where(moves[..., None], d - both[..., :-1], e)
+                excess = smooth(frame, other**2 - e**2, found, min(5, m.smoothing), m)
+                better = excess[..., 0] < 0
+                wide = np.where(excess < 0, smooth(frame, other, found, smoothing, m), wide)
+                e, s2 = np.where(excess < 0, other, e), np.where(better & moves, both[..., -1], s2)
+                energy = np.maximum(energy + np.minimum(excess[..., 0], 0), 0)
+                noise = np.where(found, np.maximum(energy - s2, energy / 4), noise)
             if name == "L":
                 q = spread(frame, lum(e) ** 2, found, smoothing, m)
                 certain = 1 - m.doubt * q / np.maximum(lum(wide) ** 2, 1e-20)

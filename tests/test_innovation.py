@@ -23,6 +23,18 @@ def run(method, frames):
     return image, state
 
 
+def with_shadow_rays(frame, seed=0, light=(1.0, -3.0, 1.0)):
+    """The frame with shadow rays to a light, of which the board (object 1) stops two in five."""
+    rng = np.random.default_rng(seed)
+    there = frame["id"] >= 0
+    toward = np.where(there[..., None], light - frame["position"], 0)
+    stopped = there & (rng.random(there.shape) < 0.4)
+    distance = np.linalg.norm(toward, axis=-1) * rng.uniform(0.3, 0.6, there.shape)
+    return with_images(frame, light=toward, light_id=np.full(there.shape, -1),
+                       blocker_distance=np.where(stopped, distance, 0),
+                       blocker_id=np.where(stopped, 1, -1))
+
+
 def split(height, width, count=3):
     """Moving frames with all channels that the method uses, and a lamp."""
     frames = []
@@ -36,15 +48,18 @@ def split(height, width, count=3):
         direct = unshadowed * visibility[..., None] * rng.uniform(0.9, 1.1, (1, 1, 3))
         specular = 0.3 * frame["indirect"] * rng.random((height, width, 1))
         color = frame["emission"] + direct + frame["indirect"]
-        frames.append(with_images(frame, albedo=albedo, unshadowed=unshadowed, color=color,
-                                  visibility=visibility, direct=direct, specular=specular))
+        frame = with_images(frame, albedo=albedo, unshadowed=unshadowed, color=color,
+                            visibility=visibility, direct=direct, specular=specular)
+        frames.append(with_shadow_rays(frame, i))
     return frames
 
 
+@pytest.mark.parametrize("shadows", [True, False])
 @pytest.mark.parametrize(("height", "width"), [(19, 26), (7, 5), (1, 9)])
-def test_it_is_the_formula_in_float64(height, width):
+def test_it_is_the_formula_in_float64(height, width, shadows):
     frames = split(height, width)
-    method = FilteredInnovation(smoothing=4, levels=3, sharp_smoothing=2, sharp_levels=2)
+    method = FilteredInnovation(smoothing=4, levels=3, sharp_smoothing=2, sharp_levels=2,
+                                follow_shadows=shadows)
     image, _ = run(method, frames)
     expected = innovation_oracle.run(frames, method)
     np.testing.assert_allclose(image, expected, rtol=1e-3, atol=5e-5)
@@ -145,8 +160,8 @@ def test_five_frames_are_one_recording_and_parameters_compile_nothing():
     assert compiled(lambda: run(other, frames)) == 0
     _, state = run(FilteredInnovation(), frames)
     works = state.works
-    steps = [works.look_back, works.merge, works.pack, works.fade, works.hide,
-             *(level.step for level in (*works.smoothing, *works.levels))]
+    steps = [works.shadow_motion, works.look_back, works.merge, works.pack,
+             *(level.step for level in (*works.around, *works.smoothing, *works.levels))]
     assert [step.recordings for step in steps] == [1] * len(steps)
 
 
