@@ -81,7 +81,7 @@ class FilteredInnovation(OnLanes):
     sharp_smoothing: int = 3
     sharp_levels: int = 3
     light_sigma: float = 8.0
-    visibility_sigma: float = 4.7
+    visibility_sigma: float = 5.0
     fade: float = 4.0
     sigma_plane: float = 0.005
     longest: float = 64.0

@@ -20,8 +20,8 @@ The sharp signals, visibility and glossy light, take a fixed share f of theirs.
     s^2 <- (1 - a)^2 s^2 + a^2 s_0^2,   s_0^2 = max(W[l(e)^2] - s^2, W[l(e)^2] / 4)
 
 with W the first `ENERGY_LEVELS` levels of S: unlike the variance of d in a window, that of e has
-no shadow's edge in it that stands still. Without history s_0^2 is the variance of l(d) over the
-pixels of the surface in a 5x5 window.
+no shadow's edge in it that stands still. Without history s_0^2 comes from what a small smoothing
+takes out of l(d): `spatial_variances`.
 
 Visibility has two histories, where the surface was and where its shadow was: `shadow_motion.py`.
 
@@ -31,9 +31,9 @@ of h compares luminance too,
     w = h exp(-distance(q, p's plane) / (sigma_plane z(p)) - ((l(p) - l(q)) / (sigma s))^2)
 
 and its last level fades out as the history grows. A pixel of another object counts for a quarter.
-Normals are not compared: where they differ much
-the tangent plane is soon left, and at a crease, or on a leaf, a neighbour turned away is a better
-guess than one sample (+0.2 to 0.9 dB for normal_power 0 instead of 4 and 128).
+Normals are not compared: where they differ much the tangent plane is soon left, and at a crease, or
+on a leaf, a neighbour turned away is a better guess than one sample (+0.2 to 0.9 dB for
+normal_power 0 instead of 4 and 128).
 
 Our own, from a trial; the nearest published relatives are the fast and slow histories of NRD and
 the gradients of A-SVGF (Schied et al. 2018).
@@ -43,6 +43,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import product
 from typing import Any
 
 import drjit as dr
@@ -206,9 +207,11 @@ def merge(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], innovat
 
 def spatial_variances(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], wanted: Any,
                       guides: list[Float]) -> list[Float]:
-    """Variance of each signal's luminance where `wanted`, over the taps within sigma_plane.
+    """Variance of each signal's luminance where `wanted`, from one frame.
 
-    Sums run over differences from the pixel itself, which keeps digits on bright pixels.
+    Mean square of what a 3x3 smoothing over the surface takes away, around the 3x3 pixels of the
+    middle, over the share that it would take of white noise. An edge of light leaves less in it
+    than in the variance of the window.
     """
     starts = [sum(sizes[:s]) for s in range(len(sizes))]
     lum = [signal[start + luma(size)] for start, size in zip(starts, sizes)]
@@ -217,18 +220,34 @@ def spatial_variances(stencil: Stencil, sizes: tuple[int, ...], signal: list[Flo
     dr.eval(table)
     around = window_taps(stencil, RADIUS, table)
 
-    def tap(i: Any) -> tuple[Float, list[Float]]:
-        inside, dy, dx, words = around(i)
-        expected = dr.fma(gx, dx, dr.fma(gy, dy, inverse_depth))
-        near = inside & (dr.abs(words[0] - expected) * scale < 1)
-        d = [there - here for there, here in zip(words[1:], lum)]
-        return dr.select(near, stencil.Float(1), 0), [*d, *(dr.square(x) for x in d)]
 
-    count, sums = weighted_sums(stencil, wanted, (2 * RADIUS + 1)**2, 2 * len(lum), tap)
-    norm = 1 / dr.maximum(count, 1)
-    means, squares = [x * norm for x in sums[:len(lum)]], [x * norm for x in sums[len(lum):]]
-    variances = [dr.fma(-m, m, m2) for m, m2 in zip(means, squares)]
-    return [dr.minimum(dr.select(v > 0, v, 0), _MOST) for v in variances]
+    def mean_square(_: Any) -> tuple[Float, list[Float]]:
+        near, values = {}, {}
+        for i, at in enumerate(product(range(-RADIUS, RADIUS + 1), repeat=2)):
+            inside, dy, dx, (tap_inverse_depth, *luminances) = around(i)
+            expected = dr.fma(gx, dx, dr.fma(gy, dy, inverse_depth))
+            near[at] = inside & (dr.abs(tap_inverse_depth - expected) * scale < 1)
+            values[at] = luminances[:len(lum)]
+        count, sums = stencil.Float(0), [stencil.Float(0)] * len(lum)
+        for cy, cx in product(range(1 - RADIUS, RADIUS), repeat=2):
+            total, squares, *means = [stencil.Float(0)] * (2 + len(lum))
+            for dy, dx in product((-1, 0, 1), repeat=2):
+                at = cy + dy, cx + dx
+                h = dr.select(near[at], stencil.Float(BINOMIAL[abs(dy)] * BINOMIAL[abs(dx)]), 0)
+                total, squares = total + h, dr.fma(h, h, squares)
+                means = [dr.fma(h, v, m) for v, m in zip(values[at], means)]
+            norm = 1 / dr.maximum(total, 1e-6)
+            share = 1 - 2 * BINOMIAL[0]**2 * norm + squares * norm * norm
+            counts = near[cy, cx] & (share > 0.1)
+            scaled = 1 / dr.maximum(share, 0.1)
+            count += dr.select(counts, stencil.Float(1), 0)
+            sums = [s + dr.select(counts, dr.square(v - m * norm) * scaled, 0)
+                    for s, v, m in zip(sums, values[cy, cx], means)]
+        norm = 1 / dr.maximum(count, 1)
+        return stencil.Float(1), [s * norm for s in sums]
+
+    _, variances = weighted_sums(stencil, wanted, 1, len(lum), mean_square)
+    return [dr.minimum(v, _MOST) for v in variances]
 
 
 def guided_level(sizes: tuple[int, ...], fading: tuple[bool, ...], values: Taps,

@@ -116,19 +116,30 @@ def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, s
 
 
 def spatial_variance(frame: Frame, signal: np.ndarray, m) -> np.ndarray:
-    pixels, shape = pixels_of(frame, x=lum(signal)), frame["id"].shape
-    count, sum1, sum2 = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    for dy in range(-2, 3):
-        for dx in range(-2, 3):
-            where, p, q = pairs(pixels, shape, dy, dx)
-            if where is None:
-                continue
-            near = (p.kind == q.kind) & ((p.kind < 2)
-                                         | (plane_weight_distance(p, q) < m.sigma_plane))
-            count[where] += near
-            sum1[where] += near * (q.x - p.x)
-            sum2[where] += near * (q.x - p.x) ** 2
-    return np.maximum(sum2 / count - (sum1 / count) ** 2, 0)
+    """Mean square of what a 3x3 smoothing takes away, at pixels near p's plane."""
+    shape = frame["id"].shape
+    pixels = pixels_of(frame, x=lum(signal))
+    taps = {}
+    for dy, dx in np.ndindex(5, 5):
+        value, near = np.zeros(shape), np.zeros(shape, bool)
+        where, p, q = pairs(pixels, shape, dy - 2, dx - 2)
+        if where is not None:
+            value[where] = q.x
+            near[where] = (p.kind == q.kind) & ((p.kind < 2) | (
+                plane_weight_distance(p, q) < m.sigma_plane))
+        taps[dy, dx] = value, near
+    count, total = np.zeros(shape), np.zeros(shape)
+    for cy, cx in np.ndindex(3, 3):
+        h = {(dy, dx): H[abs(dy - 1)] * H[abs(dx - 1)] * taps[cy + dy, cx + dx][1]
+             for dy, dx in np.ndindex(3, 3)}
+        norm = np.maximum(sum(h.values()), 1e-6)
+        mean = sum(w * taps[cy + dy, cx + dx][0] for (dy, dx), w in h.items()) / norm
+        share = 1 - 2 * H[0]**2 / norm + sum(w**2 for w in h.values()) / norm**2
+        value, near = taps[cy + 1, cx + 1]
+        counts = near & (share > 0.1)
+        count += counts
+        total += np.where(counts, (value - mean) ** 2 / np.maximum(share, 0.1), 0)
+    return total / np.maximum(count, 1)
 
 
 def look_up(previous: Frame, frame: Frame, image: np.ndarray, m) -> tuple:
