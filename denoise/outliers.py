@@ -31,7 +31,7 @@ from render.frame import Frame
 from .demodulation import Texture, read_texture
 from .parameters import check_positive, check_whole
 from .stencil import Float, Offset, Planes, Stencil, Step, Taps, window
-from .surface import GUIDES, check_size, read_surface, repair
+from .surface import GUIDES, LUMINANCE, check_size, read_surface, repair
 
 FEWEST = 4
 _PARTS = ("direct", "indirect", "specular")
@@ -89,6 +89,11 @@ class RemoveOutliers:
         if "specular" in images:
             images["indirect"] = images["indirect"] + images["specular"]
         images["color"] = color
+        if "direct" in images and "visibility" in frame:  # what is cut off was never let through
+            given, kept = (repair(np.asarray(a, np.float32), frame["id"]) @ np.float32(LUMINANCE)
+                           for a in (frame["direct"], images["direct"]))
+            share = np.divide(kept, given, out=np.ones_like(given), where=given > 0)
+            images["visibility"] = frame["visibility"] * share
         after = replace(state, before=state.before + float(before.mean(dtype=np.float64)),
                         after=state.after + float(color.mean(dtype=np.float64)))
         return replace(frame, images={**frame.images, **images}), after

@@ -192,3 +192,18 @@ def test_the_command_says_what_it_took(tmp_path, call):
     assert run["parameters"]["outlier_width"] == 1.0
     code, _, err = call("denoise", folder, "--method", "atrous", "--outliers", "0")
     assert (code, "outlier_width is 0.0: use a number above 0" in err) == (2, True)
+
+
+def test_visibility_loses_what_direct_light_loses():
+    """Otherwise the outlier stays in it, and its negative goes into the rest of the light."""
+    flat = np.full((11, 13, 3), 0.25)
+    visibility = np.full((11, 13), 0.5)
+    visibility[5, 6] = 60.0
+    direct = visibility[..., None] * 2 * flat
+    frame = with_images(make_frame(11, 13, wall_end=1e9, board=translation(100, 0, 0)),
+                        color=direct, direct=direct, indirect=0 * flat, unshadowed=2 * flat,
+                        visibility=visibility)
+    result, _ = clean(RemoveOutliers(), frame)
+    assert result["visibility"][5, 6] == pytest.approx(0.5, rel=1e-4)
+    np.testing.assert_allclose(result["visibility"][..., None] * result["unshadowed"],
+                               result["direct"], rtol=1e-4)
