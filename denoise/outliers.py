@@ -90,8 +90,9 @@ class RemoveOutliers:
             images["indirect"] = images["indirect"] + images["specular"]
         images["color"] = color
         if "direct" in images and "visibility" in frame:  # what is cut off was never let through
-            given, kept = (repair(np.asarray(a, np.float32), frame["id"]) @ np.float32(LUMINANCE)
-                           for a in (frame["direct"], images["direct"]))
+            weights = np.array(LUMINANCE, np.float32)
+            given, kept = (repair(np.asarray(image, np.float32), frame["id"]) @ weights
+                           for image in (frame["direct"], images["direct"]))
             share = np.divide(kept, given, out=np.ones_like(given), where=given > 0)
             images["visibility"] = frame["visibility"] * share
         after = replace(state, before=state.before + float(before.mean(dtype=np.float64)),
