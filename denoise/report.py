@@ -19,7 +19,7 @@ import jinja2
 import numpy as np
 
 from render.atomic import write_text
-from render.channels import RADIANCE
+from render.channels import IDS, RADIANCE
 from render.errors import InputError
 from render.sequence import Sequence
 
@@ -98,7 +98,7 @@ def _images(sequence: Sequence, scores: Scores, frame: int,
     """(where it belongs, image, how it is stored) of all images of a frame."""
     images = sequence.read_frame(frame, ("color", *channels)).images
     for name, image in images.items():
-        kind = (packed.WHOLE if name in ("id", "hit_id") else
+        kind = (packed.WHOLE if name in IDS else
                 packed.RADIANCE if name in (*RADIANCE, *_COLOURS) else packed.GUIDE)
         yield f"frame/{name}", image, kind
     if sequence.has_reference(frame):
@@ -120,7 +120,7 @@ def _measure(images: dict[str, np.ndarray], histograms: dict[str, np.ndarray],
         for name, error in zip(judged, display_errors(judged.values(), images["reference"])):
             inside = np.clip(error, EDGES[0], EDGES[-1])
             histograms[name] += np.histogram(inside, EDGES)[0]
-    for name in ("depth", "position", "hit_distance"):
+    for name in ("depth", "position", "hit_distance", "blocker_distance", "light"):
         image = images.get(f"frame/{name}")
         if image is not None:
             values = image[np.isfinite(image) & (image != 0)]

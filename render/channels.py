@@ -97,3 +97,4 @@ REPLAY = ("replay", "replay_before")
 GBUFFER = ("albedo", "normal", "position", "depth", "id")
 FRAME = RADIANCE + GBUFFER
 REFERENCE = ("color", "variance")
+IDS = ("id", "light_id", "blocker_id", "hit_id")  # of objects

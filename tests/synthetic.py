@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from render.channels import IDS
 from render.frame import Frame
 
-IDS = ("id", "light_id", "blocker_id", "hit_id")
 WALL_NORMAL = np.array([0.3, 0.1, -1.0]) / np.linalg.norm([0.3, 0.1, -1.0])
 
 

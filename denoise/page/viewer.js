@@ -102,7 +102,7 @@ class Viewer {
     const range = DATA.channels.find((c) => c.name === want.channel)?.range;
     if (want.channel === "error") paintError(out, image, reference, ev);
     else if (want.channel === "flip") paintFlip(out, image, ev);
-    else if (["id", "hit_id"].includes(want.channel)) paintObjects(out, image);
+    else if (/(^|_)id$/.test(want.channel)) paintObjects(out, image);
     else if (want.channel === "normal") paintRange(out, image, -1, 1);
     else if (range) paintRange(out, image, range[0], range[1] === range[0] ? range[0] + 1 : range[1]);
     else paintRadiance(out, image, ev);
