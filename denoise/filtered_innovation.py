@@ -58,7 +58,9 @@ class FilteredInnovation(OnLanes):
         follow: least share of the smoothed innovation that diffuse light takes, above 0 to 1;
             all of it where frames have no visibility.
         doubt: how many variances of it count as noise.
-        sharp_follow: share of it that visibility and glossy light take.
+        sharp_follow: least share of it that visibility and glossy light take.
+        renewal: weight of the current frame in visibility's high frequencies where the change of
+            the low ones is certain.
         smoothing, levels: of diffuse light, levels of the innovation's smoothing, and of the last
             filter while there is no history; the last of these fades out over `fade` frames.
         sharp_smoothing, sharp_levels: the same of visibility and of glossy light.
@@ -75,7 +77,8 @@ class FilteredInnovation(OnLanes):
     visibility_alpha: float = 0.15
     follow: float = 0.5
     doubt: float = 4.0
-    sharp_follow: float = 0.7
+    sharp_follow: float = 0.6
+    renewal: float = 0.6
     smoothing: int = 5
     levels: int = 4
     sharp_smoothing: int = 3
@@ -99,6 +102,7 @@ class FilteredInnovation(OnLanes):
             check_whole(self, f"sharp_{name}", getattr(self, name), least)
         for name in ("light_alpha", "visibility_alpha", "follow", "sharp_follow"):
             check_range(self, name, 1e-6, 1.0)
+        check_range(self, "renewal", 0.0, 1.0)
         check_range(self, "doubt", 0.0, 1e6)
         check_range(self, "longest", 1.0, 1e6)
         check_range(self, "min_cosine", -1.0, 1.0)
@@ -142,7 +146,7 @@ class FilteredInnovation(OnLanes):
         # Without visibility apart, diffuse light has the shadows in it, which are quick.
         follow = self.follow if signals.unshadowed else 1.0
         numbers = [stencil.opaque(x) for x in (
-            follow, self.doubt, self.sharp_follow, self.fade,
+            follow, self.doubt, self.sharp_follow, self.renewal, self.fade,
             *_each(works.sizes, self.light_alpha, self.visibility_alpha))]
         values, fade = works.merge(signal, innovation, smooth, energies, carried, other,
                                    guides, numbers)
@@ -209,16 +213,17 @@ class Works:
              shadows: bool) -> Works:
         surfaces = stencil.planes([_OUTSIDE, -1.0])
         leaving = [(1 + sizes[0], method.smoothing), (int(shadows), CHOICE),
-                   (sum(sizes[1:]) + int(shadows), method.sharp_smoothing),
+                   (sum(sizes[1:]) + int(shadows) + 1, method.sharp_smoothing),
                    (len(sizes), ENERGY_LEVELS)]
+        spreads = 0, 1 + sizes[0] + int(shadows)
         values = stencil.planes([0.0] * sum(planes for planes, _ in leaving))
 
         def smoothing(i: int) -> Level:
             count = sum(planes for planes, levels in leaving if i < levels)
-            return Level.make(i, values, count, surfaces, lambda *a: smooth_level(1, *a))
+            return Level.make(i, values, count, surfaces, lambda *a: smooth_level(spreads, *a))
 
         def around(i: int) -> Level:
-            return Level.make(i, values, 3, surfaces, lambda *a: smooth_level(0, *a))
+            return Level.make(i, values, 3, surfaces, lambda *a: smooth_level((), *a))
 
         def last(i: int) -> Level:
             some = sizes if i < method.sharp_levels else sizes[:1]
@@ -246,15 +251,15 @@ class Works:
 
     def smooth_innovation(self, innovation: list[Float], energies: list[Float], other: list[Float],
                           plane: list[Float]) -> tuple[list[Float], list[Float]]:
-        """Q of the first signal, S of the innovation and of the other one; W of its energies."""
-        first = self.sizes[0]
-        e, excess = other[:1], other[2:]
-        values = self.smooth(self.smoothing, [energies[0], *innovation[:first], *excess,
-                                              *innovation[first:], *e, *energies], plane)
-        end = len(values) - len(energies)
-        smooth = [*values[:1 + first], *values[1 + first + len(excess):end - len(e)],
-                  *values[1 + first:1 + first + len(excess)], *values[end - len(e):end]]
-        return smooth, values[end:]
+        """Q, S of the innovation and of the other one, as `merge` wants them; W of its energies."""
+        parts = ([energies[0]], innovation[:self.sizes[0]], other[2:], [energies[-1]],
+                 innovation[self.sizes[0]:], other[:1], energies)
+        values, smooth = self.smooth(self.smoothing, [x for part in parts for x in part], plane), []
+        for part in parts:
+            smooth.append(values[:len(part)])
+            values = values[len(part):]
+        spread, light, excess, last_spread, sharp, e, energies = smooth
+        return [*spread, *last_spread, *light, *sharp, *excess, *e], energies
 
     def filter(self, values: list[Float], plane: list[Float], fade: list[Float],
                sigmas: list[Float]) -> list[list[Float]]:
@@ -271,3 +276,4 @@ class Works:
 def _each(sizes: tuple[int, ...], light: Any, visibility: Any) -> list[Any]:
     """A parameter of each signal, light or visibility."""
     return [light if size == 3 else visibility for size in sizes]
+

@@ -9,13 +9,15 @@ variance of h's noise, s_0^2 of d's; l luminance.
 The current frame owns the low frequencies, where its noise is small, and history only what is left
 of the high ones: h + S[e] + a (e - S[e]) is the same sum. Plain accumulation is S = 0: it lags.
 
-Diffuse light, whose changes are slow, takes only what it must of S[e] where that may be noise,
-f = max(1 - k Q / l(S[e])^2, g), with Q = sum w^2 l(e)^2 / (sum w)^2 through all levels, an estimate
-of S[e]'s variance (as White's 1980 of a regression's):
+S[e] may be noise itself. With Q = sum w^2 l(e)^2 / (sum w)^2 through all its levels, an estimate of
+its variance (as White's 1980 of a regression's), a change is certain by c = 1 - k Q / l(S[e])^2,
+and a signal takes the share f of it:
 
     h <- h + f S[e] + a (e - S[e])
 
-The sharp signals, visibility and glossy light, take a fixed share f of theirs.
+    diffuse light, whose changes are slow        f = max(c, g)
+    glossy light                                 f = g'
+    visibility, whose changes have sharp edges   f = max(c, g'),  a = max(1 / n, alpha, r c)
 
     s^2 <- (1 - a)^2 s^2 + a^2 s_0^2,   s_0^2 = max(W[l(e)^2] - s^2, W[l(e)^2] / 4)
 
@@ -42,7 +44,7 @@ the gradients of A-SVGF (Schied et al. 2018).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from itertools import product
 from typing import Any
 
@@ -121,30 +123,29 @@ def pack_history(stencil: Stencil, sizes: tuple[int, ...], surface: list[Float],
     return pack_records(stencil, surface, [*values[-last:], *length, *values[:-last]])
 
 
-def smooth_level(spreads: int, values: Taps, surfaces: Taps, plane: list[Float],
+def smooth_level(spreads: Collection[int], values: Taps, surfaces: Taps, plane: list[Float],
                  spacing: list[Float]) -> list[Float]:
-    """One level of S, before which stand some of Q. The last tap is the pixel itself.
+    """One level of S, and of Q. The last tap is the pixel itself.
 
     Args:
-        spreads: how many of Q. values: what Q is of, then what S is of.
+        spreads: indices of what Q is of. values: what Q and S are of.
         surfaces: 1/z, far away where a pixel has no history, so that it does not count; ID.
         plane: slope of 1/z by column and row, scale of a difference of 1/z.
         spacing: pixels between taps.
     """
     exponent = surface_exponent(surfaces, plane, *spacing)
     h0 = BINOMIAL[0]**2
-    center = values.at(-1)
-    total, sums = type(plane[0])(h0), [v * h0 for v in center[spreads:]]
-    variances = [v * h0**2 for v in center[:spreads]]
+    total = type(plane[0])(h0)
+    sums = [v * (h0**2 if c in spreads else h0) for c, v in enumerate(values.at(-1))]
     for i, offset in enumerate(window(1)):
         w = exp2(exponent(i, offset))
-        tap = values.at(i)
-        sums = [dr.fma(w, v, s) for v, s in zip(tap[spreads:], sums)]
-        variances = [dr.fma(w * w, v, s) for v, s in zip(tap, variances)]
+        w2 = w * w
+        sums = [dr.fma(w2 if c in spreads else w, v, s)
+                for c, (v, s) in enumerate(zip(values.at(i), sums))]
         total += w
         values.next()
     norm = 1 / total
-    return [*(v * dr.square(norm) for v in variances), *(s * norm for s in sums)]
+    return [s * (dr.square(norm) if c in spreads else norm) for c, s in enumerate(sums)]
 
 
 def surface_exponent(surfaces: Taps, plane: list[Float],
@@ -171,13 +172,14 @@ def merge(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], innovat
     """The new history, a signal's planes and its s^2 each; and how the last filter fades out.
 
     Args:
-        smooth: Q, then S[e], and of what is in `other` how much greater e^2 is, and e.
+        smooth: Q of the first and the last signal, S[e], and S of what is in `other`: how much
+            greater e^2 is, and e.
         energies: W[l(e)^2]. carried, other: as from `look_back`.
-        guides: 1/z, its slopes (2) and scale, of all pixels. numbers: g, k, f of the sharp
-            signals, frames until the filter has faded, and each signal's alpha.
+        guides: 1/z, its slopes (2) and scale, of all pixels. numbers: g, k, g', r,
+            frames until the filter has faded, and each signal's alpha.
     """
     length, *variances = carried
-    spread, *smooth = smooth
+    spread, last_spread, *smooth = smooth
     if other:
         *smooth, excess, wide_other = smooth
         better = excess < 0
@@ -185,17 +187,20 @@ def merge(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], innovat
         smooth[-1] = dr.select(better, wide_other, smooth[-1])
         variances[-1] = dr.select(better, other[1], variances[-1])
         energies = [*energies[:-1], dr.maximum(energies[-1] + dr.minimum(excess, 0), 0)]
-    least, doubt, sharp, frames, *alphas = numbers
+    least, doubt, sharp, renewal, frames, *alphas = numbers
     new = length < 1.5
     first = spatial_variances(stencil, sizes, signal, new, guides)
     values, at = [], 0
     for s, size in enumerate(sizes):
         a = dr.maximum(1 / length, alphas[s])
         e, wide = innovation[at:at + size], smooth[at:at + size]
-        follow = dr.maximum(sharp, a)
+        follow = sharp
         if s == 0:
-            certain = 1 - doubt * spread / dr.maximum(dr.square(wide[luma(size)]), _LEAST)
-            follow = dr.maximum(dr.maximum(certain, least), a)
+            follow = dr.maximum(_certainty(spread, wide[luma(size)], doubt), least)
+        elif s == len(sizes) - 1:
+            certain = _certainty(last_spread, wide[luma(size)], doubt)
+            a, follow = dr.maximum(a, renewal * certain), dr.maximum(certain, sharp)
+        follow = dr.maximum(follow, a)
         values += [dr.fma(follow - a, y, dr.fma(a - 1, x, d))
                    for d, x, y in zip(signal[at:at + size], e, wide)]
         noise = dr.select(new, first[s], dr.maximum(energies[s] - variances[s],
@@ -203,6 +208,11 @@ def merge(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], innovat
         values.append(dr.fma(dr.square(1 - a), variances[s], dr.square(a) * noise))
         at += size
     return values, [_fade_out(length, frames)]
+
+
+def _certainty(spread: Float, wide: Float, doubt: Float) -> Float:
+    """1 - k Q / l(S[e])^2."""
+    return 1 - doubt * spread / dr.maximum(dr.square(wide), _LEAST)
 
 
 def spatial_variances(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], wanted: Any,

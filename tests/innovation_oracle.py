@@ -227,7 +227,7 @@ def run(frames: list[Frame], m) -> np.ndarray:
                 e, s2 = np.where(found[..., None], d - both[..., :-1], 0), both[..., -1]
                 energy = smooth(frame, lum(e)[..., None] ** 2, found, 2, m)[..., 0]
                 noise = np.where(found, np.maximum(energy - s2, energy / 4), noise)
-            a = np.maximum(1 / n, alpha)
+            a, q = np.maximum(1 / n, alpha), spread(frame, lum(e) ** 2, found, smoothing, m)
             wide, follow = smooth(frame, e, found, smoothing, m), np.maximum(m.sharp_follow, a)
             if name == "V" and previous is not None and m.follow_shadows and "light" in frame:
                 both = np.concatenate([kept[name][0], kept[name][1][..., None]], -1)
@@ -240,10 +240,11 @@ def run(frames: list[Frame], m) -> np.ndarray:
                 e, s2 = np.where(excess < 0, other, e), np.where(better & moves, both[..., -1], s2)
                 energy = np.maximum(energy + np.minimum(excess[..., 0], 0), 0)
                 noise = np.where(found, np.maximum(energy - s2, energy / 4), noise)
-            if name == "L":
-                q = spread(frame, lum(e) ** 2, found, smoothing, m)
+            if name != "G":
                 certain = 1 - m.doubt * q / np.maximum(lum(wide) ** 2, 1e-20)
-                follow = np.maximum(np.maximum(certain, m.follow), a)
+                follow = np.maximum(certain, m.follow if name == "L" else m.sharp_follow)
+                a = a if name == "L" else np.maximum(a, m.renewal * certain)
+                follow = np.maximum(follow, a)
             history = d - (1 - a)[..., None] * e + (follow - a)[..., None] * wide
             s2 = (1 - a) ** 2 * s2 + a**2 * noise
             kept[name] = history, s2

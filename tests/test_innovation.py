@@ -185,7 +185,7 @@ def test_other_channels_halfway_are_refused():
 @pytest.mark.parametrize("settings", [
     {"levels": 0}, {"levels": 2.0}, {"sharp_levels": 5}, {"sharp_smoothing": 1},
     {"light_alpha": 0.0}, {"visibility_sigma": -1.0}, {"longest": 0.0}, {"follow": 0.0},
-    {"doubt": -1.0}, {"fade": 0.0}])
+    {"doubt": -1.0}, {"fade": 0.0}, {"sharp_follow": 0.0}, {"renewal": 2.0}])
 def test_bad_parameters_are_refused(settings):
     with pytest.raises(InputError, match=next(iter(settings))):
         FilteredInnovation(**settings)
