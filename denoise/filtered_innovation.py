@@ -212,7 +212,8 @@ class Works:
     def make(method: FilteredInnovation, stencil: Stencil, sizes: tuple[int, ...],
              shadows: bool) -> Works:
         surfaces = stencil.planes([_OUTSIDE, -1.0])
-        leaving = [(1 + sizes[0], method.smoothing), (int(shadows), CHOICE),
+        leaving = [(1 + sizes[0], method.smoothing),
+                   (int(shadows), max(CHOICE, method.sharp_smoothing)),
                    (sum(sizes[1:]) + int(shadows) + 1, method.sharp_smoothing),
                    (len(sizes), ENERGY_LEVELS)]
         spreads = 0, 1 + sizes[0] + int(shadows)

@@ -234,7 +234,8 @@ def run(frames: list[Frame], m) -> np.ndarray:
                 both, moves = shadow_history(previous, frame, both, m)
                 moves &= found
                 other = np.where(moves[..., None], d - both[..., :-1], e)
-                excess = smooth(frame, other**2 - e**2, found, min(5, m.smoothing), m)
+                levels_ = min(max(5, m.sharp_smoothing), m.smoothing)
+                excess = smooth(frame, other**2 - e**2, found, levels_, m)
                 better = excess[..., 0] < 0
                 wide = np.where(excess < 0, smooth(frame, other, found, smoothing, m), wide)
                 e, s2 = np.where(excess < 0, other, e), np.where(better & moves, both[..., -1], s2)

@@ -55,11 +55,12 @@ def split(height, width, count=3):
 
 
 @pytest.mark.parametrize("shadows", [True, False])
-@pytest.mark.parametrize(("height", "width"), [(19, 26), (7, 5), (1, 9)])
-def test_it_is_the_formula_in_float64(height, width, shadows):
+@pytest.mark.parametrize(("height", "width", "smoothing", "sharp_smoothing"), [
+    (19, 26, 4, 2), (7, 5, 4, 2), (1, 9, 4, 2), (13, 11, 7, 6), (12, 9, 6, 3)])
+def test_it_is_the_formula_in_float64(height, width, smoothing, sharp_smoothing, shadows):
     frames = split(height, width)
-    method = FilteredInnovation(smoothing=4, levels=3, sharp_smoothing=2, sharp_levels=2,
-                                follow_shadows=shadows)
+    method = FilteredInnovation(smoothing=smoothing, levels=3, sharp_smoothing=sharp_smoothing,
+                                sharp_levels=2, follow_shadows=shadows)
     image, _ = run(method, frames)
     expected = innovation_oracle.run(frames, method)
     np.testing.assert_allclose(image, expected, rtol=1e-3, atol=5e-5)
