@@ -32,7 +32,7 @@ of h compares luminance too,
 
     w = h exp(-distance(q, p's plane) / (sigma_plane z(p)) - ((l(p) - l(q)) / (sigma s))^2)
 
-and its last level fades out as the history grows. A pixel of another object counts for a quarter.
+and its last level fades out as the history grows. A pixel of another object counts for two fifths.
 Normals are not compared: where they differ much the tangent plane is soon left, and at a crease, or
 on a leaf, a neighbour turned away is a better guess than one sample (+0.2 to 0.9 dB for
 normal_power 0 instead of 4 and 128).
@@ -61,7 +61,7 @@ from .stencil import Float, Offset, Stencil, Taps, window
 BINOMIAL = {0: 1 / 2, 1: 1 / 4}
 ENERGY_LEVELS = 2
 LEAST_NOISE = 0.25    # share of the innovation's energy that is at least noise of d
-STRANGER = 0.25       # weight of a pixel of another object, beside its distance
+STRANGER = 0.4        # weight of a pixel of another object, beside its distance
 RADIUS = 2            # pixels, of the window of the spatial variance
 _NEVER = -1e3         # log2 of a weight that is 0
 _UNSEEN = -3e14       # 1/z of a pixel without history

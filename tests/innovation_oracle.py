@@ -45,7 +45,7 @@ def kind_of(frame: Frame) -> np.ndarray:
 
 def geometry(p: Pixels, q: Pixels, dy: int, dx: int, m) -> np.ndarray:
     distance = np.where(p.kind == 2, plane_weight_distance(p, q) / m.sigma_plane, 0)
-    w = H[abs(dy)] * H[abs(dx)] * np.exp(-distance) * np.where(p.id == q.id, 1, 0.25)
+    w = H[abs(dy)] * H[abs(dx)] * np.exp(-distance) * np.where(p.id == q.id, 1, 0.4)
     return np.where(p.kind == q.kind, w, 0)
 
 
