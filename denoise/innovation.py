@@ -26,6 +26,7 @@ no shadow's edge in it that stands still. Without history s_0^2 comes from what 
 takes out of l(d): `spatial_variances`.
 
 Visibility has two histories, where the surface was and where its shadow was: `shadow_motion.py`.
+Where the latter is taken, W is less by as much as its e^2 is, smoothed, and at least 0.
 
 A smoothing is a-trous levels of 3x3 taps, h = {1/4, 1/2, 1/4}^2, 2^i pixels apart. The last filter
 of h compares luminance too,
@@ -197,7 +198,7 @@ def merge(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], innovat
         follow = sharp
         if s == 0:
             follow = dr.maximum(_certainty(spread, wide[luma(size)], doubt), least)
-        elif s == len(sizes) - 1:
+        elif size == 1:
             certain = _certainty(last_spread, wide[luma(size)], doubt)
             a, follow = dr.maximum(a, renewal * certain), dr.maximum(certain, sharp)
         follow = dr.maximum(follow, a)
@@ -230,7 +231,6 @@ def spatial_variances(stencil: Stencil, sizes: tuple[int, ...], signal: list[Flo
     dr.eval(table)
     around = window_taps(stencil, RADIUS, table)
 
-
     def mean_square(_: Any) -> tuple[Float, list[Float]]:
         near, values = {}, {}
         for i, at in enumerate(product(range(-RADIUS, RADIUS + 1), repeat=2)):
@@ -261,8 +261,7 @@ def spatial_variances(stencil: Stencil, sizes: tuple[int, ...], signal: list[Flo
 
 
 def guided_level(sizes: tuple[int, ...], fading: tuple[bool, ...], values: Taps,
-                 surfaces: Taps,
-                 plane: list[Float], spacing: list[Float], fade: list[Float],
+                 surfaces: Taps, plane: list[Float], spacing: list[Float], fade: list[Float],
                  sigmas: list[Float]) -> list[Float]:
     """One level of the last filter over the signals of these sizes, each with its variance.
 

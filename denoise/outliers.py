@@ -7,8 +7,9 @@ k = outlier_width.
     C <- clamp(C, mu - k sigma, mu + k sigma)
 
 The signals are direct and indirect light (specular light apart), where the frame has them, else its
-colour without emission. A rare bright pixel ("firefly") is energy that belongs to its neighbours as
-well, so what is cut off darkens the image: `Cleaned.energy_kept` says by how much.
+colour without emission; visibility loses the share that direct light loses. A rare bright pixel
+("firefly") is energy that belongs to its neighbours as well, so what is cut off darkens the image:
+`Cleaned.energy_kept` says by how much.
 
 Source: GAMES202, lecture 13, outlier removal: a window of 7x7 or 5x5, mu -+ k sigma.
 
@@ -29,9 +30,10 @@ import numpy as np
 from render.frame import Frame
 
 from .demodulation import Texture, read_texture
+from .luminance import luminance
 from .parameters import check_positive, check_whole
 from .stencil import Float, Offset, Planes, Stencil, Step, Taps, window
-from .surface import GUIDES, LUMINANCE, check_size, read_surface, repair
+from .surface import GUIDES, check_size, read_surface, repair
 
 FEWEST = 4
 _PARTS = ("direct", "indirect", "specular")
@@ -90,8 +92,7 @@ class RemoveOutliers:
             images["indirect"] = images["indirect"] + images["specular"]
         images["color"] = color
         if "direct" in images and "visibility" in frame:  # what is cut off was never let through
-            weights = np.array(LUMINANCE, np.float32)
-            given, kept = (repair(np.asarray(image, np.float32), frame["id"]) @ weights
+            given, kept = (luminance(repair(np.asarray(image, np.float32), frame["id"]))
                            for image in (frame["direct"], images["direct"]))
             share = np.divide(kept, given, out=np.ones_like(given), where=given > 0)
             images["visibility"] = frame["visibility"] * share

@@ -81,7 +81,7 @@ def motion_table(previous: Frame, current: Frame) -> np.ndarray:
 
 def world_motions(previous: Frame, current: Frame) -> np.ndarray:
     """(objects, 4, 4) M' M^-1, exactly the identity for an object at rest; NaN for one that only
-    one of the frames has or whose M cannot be inverted."""
+    one of the frames has, or whose M has changed and cannot be inverted."""
     before = np.full(current.world_from_object.shape, np.nan)
     count = min(len(before), len(previous.world_from_object))
     before[:count] = previous.world_from_object[:count]

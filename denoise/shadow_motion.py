@@ -9,8 +9,9 @@ same shadow fell where their line meets the tangent plane:
 
     X' = X + d,   d = y - (n . y / n . (b - y)) (b - y),   y = Y' - X,  b = B' - X.
 
-There visibility has another history. A pixel takes the mean of u' - u over the pixels of its
-surface around it whose shadow moves: one sample that is lit tells nothing. Which history is the
+There visibility has another history. A pixel takes the mean of u' - u over a few pixels around it
+whose shadow moves (one level of the smoothing of `innovation.py`), for one sample that is lit tells
+nothing. Which history is the
 right one is not known beforehand (shadows of several objects cross, or one turns): it is the one
 whose squared innovation, smoothed, is smaller.
 
@@ -94,7 +95,7 @@ def shadow_motion(stencil: Stencil, hits: list[Float], surface: list[Float], pos
     light = transform(rows[:3], light)
     length2 = dot(light, light)
     id_, *normal, depth = surface
-    blocked = ((id_ >= 0) & (distance > 0) & (length2 > 0) & (blocker_id >= 0)
+    blocked = ((id_ >= 0) & (id_ < objects) & (distance > 0) & (length2 > 0) & (blocker_id >= 0)
                & (blocker_id < objects) & (light_id < objects))
     light_id = dr.select(light_id >= 0, light_id, objects)
     share = distance * dr.rsqrt(dr.select(blocked, length2, 1))

@@ -295,20 +295,24 @@ class Step:
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        self._function = function
-        self._called_with: tuple[Any, ...] = ()
-        self._frozen = dr.freeze(self._record, state_fn=lambda *_: _sizes(*self._called_with),
+        called_with: list[tuple[Any, ...]] = [()]  # by the call that is being made, if any
+
+        def record(*arguments: Any) -> Any:
+            return function(*(a.seen_as(b) if isinstance(a, Taps) else b
+                              for a, b in zip(called_with[0], arguments)))
+
+        self._called_with = called_with
+        self._frozen = dr.freeze(record, state_fn=lambda *_: _sizes(*called_with[0]),
                                  warn_after=1000)
 
     def __call__(self, *arguments: Any) -> Any:
-        self._called_with = arguments
-        with _no_collection():
-            # Dr.Jit walks lists twice as fast as it walks dataclasses.
-            return self._frozen(*(a.arrays if isinstance(a, Taps) else a for a in arguments))
-
-    def _record(self, *arguments: Any) -> Any:
-        return self._function(*(a.seen_as(b) if isinstance(a, Taps) else b
-                                for a, b in zip(self._called_with, arguments)))
+        self._called_with[0] = arguments
+        try:
+            with _no_collection():
+                # Dr.Jit walks lists twice as fast as it walks dataclasses.
+                return self._frozen(*(a.arrays if isinstance(a, Taps) else a for a in arguments))
+        finally:
+            self._called_with[0] = ()
 
     @property
     def recordings(self) -> int:

@@ -19,7 +19,8 @@ class Channel:
         exr: channel names in the file, in component order; their number is the number of
             components. One component is an (h, w) image, more are (h, w, c).
         half: stored as float16 (16-bit data loses nothing that matters there), else float32.
-            In memory everything is float32, the object ID int32.
+            In memory everything is float32, `id` int32; other object IDs are int32 as rendered and
+            float32 as read.
         background: value of a pixel whose ray hits nothing.
         about: meaning, space and unit.
     """

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import innovation_oracle
 import numpy as np
 import pytest
@@ -164,6 +166,14 @@ def test_five_frames_are_one_recording_and_parameters_compile_nothing():
     steps = [works.shadow_motion, works.look_back, works.merge, works.pack,
              *(level.step for level in (*works.around, *works.smoothing, *works.levels))]
     assert [step.recordings for step in steps] == [1] * len(steps)
+
+
+def test_glossy_light_is_renewed_by_no_change_where_there_is_no_visibility():
+    names = ("visibility", "unshadowed")
+    frames = [replace(f, images={k: v for k, v in f.images.items() if k not in names})
+              for f in split(16, 20, 3)]
+    one, other = (run(FilteredInnovation(renewal=share), frames)[0] for share in (0.0, 1.0))
+    np.testing.assert_array_equal(one, other)
 
 
 def test_two_threads_give_what_one_gives():

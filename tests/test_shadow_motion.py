@@ -127,7 +127,18 @@ def test_broken_shadow_rays_leave_images_finite(value):
         broken = [replace(f, images={**f.images, name: np.full_like(f[name], value)})
                   for f in frames]
         assert np.isfinite(run(FilteredInnovation(), broken)[0]).all()
-    whole = np.full(frames[0]["blocker_id"].shape, 2**31 - 1, np.int32)
-    broken = [replace(f, images={**f.images, "blocker_id": whole, "light_id": whole})
-              for f in frames]
-    assert np.isfinite(run(FilteredInnovation(), broken)[0]).all()
+
+
+@pytest.mark.parametrize("value", [-5, 2, 10**6, 2**31 - 1])
+@pytest.mark.parametrize("names", [("id",), ("blocker_id",), ("light_id",),
+                                   ("blocker_id", "light_id")])
+def test_objects_that_do_not_exist_leave_images_finite(names, value):
+    """As float32 too, which is what they are when read from a file."""
+    for dtype in (np.int32, np.float32):
+        frames = split(16, 20, 3)
+        for frame in frames:
+            for name in names:
+                frame.images[name][4:9, 5:12] = value
+        frames = [replace(f, images={**f.images, **{
+            name: f[name].astype(dtype) for name in ("blocker_id", "light_id")}}) for f in frames]
+        assert np.isfinite(run(FilteredInnovation(), frames)[0]).all()

@@ -1,5 +1,7 @@
+import gc
 import subprocess
 import sys
+import weakref
 
 import drjit as dr
 import numpy as np
@@ -123,6 +125,21 @@ def test_a_step_replays_with_other_memory():
         result = step(taps, [stencil.constant(value), stencil.constant(10 * value)])
         assert stencil.image(result)[0].tolist() == [3 + 84 * value] * 5
     assert step.recordings == 1
+
+
+def test_a_step_holds_no_arguments_between_calls_and_goes_when_it_is_dropped():
+    stencil = stencil_of(5, 7, 1)
+    step = Step(lambda arrays: [arrays[0] + 1])
+    step([stencil.constant(1)])
+    assert not any(isinstance(value, Step) for value in vars(step).values())
+    assert step._called_with == [()]
+    gc.disable()  # without the help of the cycle collector
+    try:
+        there = weakref.ref(step)
+        del step
+        assert there() is None
+    finally:
+        gc.enable()
 
 
 @pytest.mark.parametrize("alias_first", [True, False])
