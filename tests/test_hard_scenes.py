@@ -167,6 +167,9 @@ def test_a_scene_far_away_tiny_or_huge_looks_as_it_does_at_the_origin():
     hits = [Renderer(HARD[name].make(), HEIGHT, WIDTH).frame(
         3, channels=("hit_distance",))["hit_distance"].mean() for name in ("tiny", "far", "huge")]
     np.testing.assert_allclose(np.divide(hits, hits[1]), [1e-4, 1, 1e4], rtol=0.05)
+    for ray in ("light", "blocker_distance"):
+        means = [np.abs(rendered(name)[0][0][ray]).mean() for name in ("tiny", "far", "huge")]
+        np.testing.assert_allclose(np.divide(means, means[1]), [1e-4, 1, 1e4], rtol=0.05)
 
 
 def test_an_environment_map_is_seen_where_nothing_is_and_lights_the_rest():

@@ -37,8 +37,16 @@ def with_shadow_rays(frame, seed=0, light=(1.0, -3.0, 1.0)):
                        blocker_id=np.where(stopped, 1, -1))
 
 
+def with_neighbour(frame):
+    """The frame with the right part of its wall as an object of its own, number 2."""
+    right = (frame["id"] == 0) & (frame["position"][..., 0] > 0.5)
+    return replace(with_images(frame, id=np.where(right, 2, frame["id"])),
+                   world_from_object=np.concatenate([frame.world_from_object,
+                                                     frame.world_from_object[:1]]))
+
+
 def split(height, width, count=3):
-    """Moving frames with all channels that the method uses, and a lamp."""
+    """Moving frames with all channels that the method uses, a lamp, and three objects."""
     frames = []
     for i, frame in enumerate(moving(height, width, count)):
         rng = np.random.default_rng(100 + i)
@@ -52,7 +60,7 @@ def split(height, width, count=3):
         color = frame["emission"] + direct + frame["indirect"]
         frame = with_images(frame, albedo=albedo, unshadowed=unshadowed, color=color,
                             visibility=visibility, direct=direct, specular=specular)
-        frames.append(with_shadow_rays(frame, i))
+        frames.append(with_neighbour(with_shadow_rays(frame, i)))
     return frames
 
 

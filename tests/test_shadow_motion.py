@@ -7,6 +7,7 @@ from dataclasses import replace
 import innovation_oracle
 import numpy as np
 import pytest
+from synthetic import translation
 from test_innovation import run, split
 from test_renderer import gray, small_scene
 
@@ -86,7 +87,12 @@ def test_no_shadow_moves_where_only_the_camera_does_or_nothing():
 
 
 def test_the_kernel_is_the_oracle():
+    """With lights that are an object's, and one that is nobody's, and all objects moving."""
     before, frame = split(19, 26, 2)
+    rng = np.random.default_rng(5)
+    matrices = frame.world_from_object @ [translation(0.1 * i, -0.05, 0.02) for i in (1, 2, 3)]
+    lights = rng.integers(-1, 3, frame["light_id"].shape).astype(np.int32)
+    frame = replace(frame, world_from_object=matrices, images={**frame.images, "light_id": lights})
     moves, shift = motion_of(before, frame)
     expected = innovation_oracle.shadow_shift(before, frame)
     np.testing.assert_array_equal(moves, np.isfinite(expected).all(-1))
