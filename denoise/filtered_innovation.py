@@ -137,7 +137,7 @@ class FilteredInnovation(OnLanes):
         works.surfaces.store([inverse_depth, id_])
         shadows = []
         if rays:
-            shadows = works.smooth(works.around, works.shadow_motion(
+            shadows = works.through(works.around, works.shadow_motion(
                 rays.hits, near, surface.position, rays.table, rays.matrices), plane)
         innovation, energies, carried, seen, other = works.look_back(
             signal, near, guides, [table], dual, [state.records], shadows, limits)
@@ -150,8 +150,8 @@ class FilteredInnovation(OnLanes):
             *_each(works.sizes, self.light_alpha, self.visibility_alpha))]
         values, fade = works.merge(signal, innovation, smooth, energies, carried, other,
                                    guides, numbers)
-        sigmas = [stencil.opaque(math.sqrt(LOG2E) / x) for x in _each(works.sizes, self.light_sigma,
-                                                           self.visibility_sigma)]
+        sigmas = [stencil.opaque(math.sqrt(LOG2E) / x)
+                  for x in _each(works.sizes, self.light_sigma, self.visibility_sigma)]
         works.surfaces.store([inverse_depth])
         parts = works.filter(values, plane, fade, sigmas)
         records = works.pack(near, carried[:1], values)
@@ -241,13 +241,14 @@ class Works:
             Step(lambda *a: merge(stencil, sizes, *a)),
             Step(lambda *a: pack_history(stencil, sizes, *a)))
 
-    def smooth(self, levels: list[Level], values: list[Float], plane: list[Float]) -> list[Float]:
+    def through(self, levels: list[Level], values: list[Float], plane: list[Float],
+                *numbers: list[Float]) -> list[Float]:
         """Values after these levels, of which later ones may be of the first values alone."""
         values = list(values)
-        for level in levels if values else []:
+        for level in levels:
             count = len(level.taps[0].at(0))
             self.values.store(values[:count], gutters=True)
-            values[:count] = level.step(*level.taps, plane, [level.spacing])
+            values[:count] = level.step(*level.taps, plane, [level.spacing], *numbers)
         return values
 
     def smooth_innovation(self, innovation: list[Float], energies: list[Float], other: list[Float],
@@ -255,7 +256,8 @@ class Works:
         """Q, S of the innovation and of the other one, as `merge` wants them; W of its energies."""
         parts = ([energies[0]], innovation[:self.sizes[0]], other[2:], [energies[-1]],
                  innovation[self.sizes[0]:], other[:1], energies)
-        values, smooth = self.smooth(self.smoothing, [x for part in parts for x in part], plane), []
+        values, smooth = [x for part in parts for x in part], []
+        values = self.through(self.smoothing, values, plane)
         for part in parts:
             smooth.append(values[:len(part)])
             values = values[len(part):]
@@ -265,11 +267,7 @@ class Works:
     def filter(self, values: list[Float], plane: list[Float], fade: list[Float],
                sigmas: list[Float]) -> list[list[Float]]:
         """The last filter of each signal; values: planes of each signal and its variance."""
-        values = list(values)
-        for level in self.levels:
-            count = len(level.taps[0].at(0))
-            self.values.store(values[:count], gutters=True)
-            values[:count] = level.step(*level.taps, plane, [level.spacing], fade, sigmas)
+        values = self.through(self.levels, values, plane, fade, sigmas)
         starts = [sum(self.sizes[:s]) + s for s in range(len(self.sizes))]
         return [values[start:start + size] for start, size in zip(starts, self.sizes)]
 

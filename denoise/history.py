@@ -27,7 +27,6 @@ from .surface import dot
 WORDS = 16          # floats in a record, one cache line
 MOST_VALUES = 12
 _HEAD = WORDS - MOST_VALUES
-_CHUNK = 8          # floats that one gather brings, at most
 _NOBODY = -2.0      # ID of an empty record
 
 
@@ -71,8 +70,8 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
         """Values of a record, and whether it passes."""
         on_screen = ((column >= 0) & (column < stencil.width)
                      & (row >= 0) & (row < stencil.height))
-        words = _record(stencil, records, dr.select(on_screen, row * stencil.stride + column, 0),
-                        _HEAD + count)
+        lane = dr.select(on_screen, row * stencil.stride + column, 0)
+        words = stencil.unpack(records, lane, WORDS, _HEAD + count)
         head, nx, ny, depth = words[:_HEAD]
         id_ = dr.floor(head)
         nz = dr.sqrt(dr.maximum(dr.fma(-nx, nx, dr.fma(-ny, ny, 1)), 0))
@@ -88,7 +87,8 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
 
     def corner(dy: Any, dx: Any) -> tuple[Float, list[Float]]:
         values, passes = tap(int_t(left) + dx, int_t(top) + dy)
-        return dr.select(passes, _share(fx, dx) * _share(fy, dy), 0), values
+        weight = dr.abs(fx + (float_t(dx) - 1)) * dr.abs(fy + (float_t(dy) - 1))
+        return dr.select(passes, weight, 0), values
 
     if wanted is None:
         sums, total = [float_t(0)] * count, float_t(0)
@@ -114,17 +114,3 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
     found = place.inside & (total >= LEAST_WEIGHT)
     scale = dr.select(found, 1 / dr.select(found, total, 1), 0)
     return [s * scale for s in sums], found
-
-
-def _share(fraction: Float, which: Any) -> Float:
-    """Weight of the first (0) or the second (1) of two neighbours."""
-    return dr.abs(fraction - 1 + which) if isinstance(which, int) else dr.abs(
-        fraction - 1 + type(fraction)(which))
-
-
-def _record(stencil: Stencil, records: Float, lane: Any, count: int) -> list[Float]:
-    words: list[Float] = []
-    for chunk in range(-(-count // _CHUNK)):
-        index = stencil.UInt(lane) * (WORDS // _CHUNK) + chunk
-        words += list(dr.gather(stencil.ArrayXf, records, index, shape=(_CHUNK, stencil.lanes)))
-    return words[:count]

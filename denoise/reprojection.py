@@ -203,8 +203,7 @@ def reproject(stencil: Stencil, surface: list[Float], table: Float, dual: list[F
     at = locate(stencil, surface, table, dual, limits[1])
 
     def tap(lane: Any) -> list[Float]:
-        words = dr.gather(stencil.ArrayXf, history, lane, shape=(WORDS, stencil.lanes))
-        return [words[i] for i in range(WORDS)]
+        return stencil.unpack(history, lane, WORDS)
 
     if tests.nearest:
         words = tap(stencil.UInt(at.y) * stencil.stride + stencil.UInt(at.x))
@@ -232,11 +231,7 @@ def reproject(stencil: Stencil, surface: list[Float], table: Float, dual: list[F
 
 def _motion(stencil: Stencil, table: Float, object_: Any) -> tuple[list[Any], list[list[Float]]]:
     """(row of E, row of S' t) three times over, and R's rows, of each pixel's object."""
-    start = stencil.UInt(object_) * (_ROW // WORDS)
-    words = []
-    for i in range(3):
-        eight = dr.gather(stencil.ArrayXf, table, start + i, shape=(WORDS, stencil.lanes))
-        words += [eight[k] for k in range(WORDS)]
+    words = stencil.unpack(table, object_, _ROW, 24)
     motion = [part for at in (0, 4, 8) for part in (words[at:at + 3], words[at + 3])]
     return motion, [words[at:at + 3] for at in (12, 16, 20)]
 

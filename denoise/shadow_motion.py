@@ -42,8 +42,7 @@ CHOICE = 5        # levels of the smoothing of squared innovations
 SLOWEST = 0.05    # pixels a frame: a shadow that moves less stands still
 FEWEST = 1e-3     # share of the pixels around, below which nothing moves
 FASTEST = 0.25    # of the screen's width: what is quicker is no motion that history could follow
-_ROW = 32         # floats an object: T and T^-1, rows of 4, each padded to 16
-_EIGHT = 8
+_MATRIX = 16      # floats
 
 
 def has_shadow_rays(frame: Frame) -> bool:
@@ -51,10 +50,10 @@ def has_shadow_rays(frame: Frame) -> bool:
 
 
 def shadow_table(previous: Frame, current: Frame) -> np.ndarray:
-    """(objects + 1, 32) float32: T and T^-1 of each object and, last, of what stands still."""
+    """(objects + 1, 2, 16) float32: T and T^-1 of each object and, last, of what stands still."""
     motions = np.concatenate([world_motions(previous, current), np.eye(4)[None]])
     t = previous.camera_from_world @ motions @ np.linalg.inv(current.camera_from_world)
-    return np.stack([t, inverses(t)], 1).astype(np.float32).reshape(-1, _ROW)
+    return np.stack([t, inverses(t)], 1).astype(np.float32).reshape(-1, 2, _MATRIX)
 
 
 @dataclass(frozen=True)
@@ -102,12 +101,16 @@ def shadow_motion(stencil: Stencil, hits: list[Float], surface: list[Float], pos
     row, column = stencil.pixel()
 
     def follow(_: Any) -> tuple[Float, list[Float]]:
-        back = _matrix(stencil, table[0], stencil.Float(id_), blocked, 1)
+        def matrix(object_: Float, inverse: int) -> list[Float]:
+            row = 2 * stencil.UInt(dr.select(blocked, object_, 0)) + inverse
+            return stencil.unpack(table[0], row, _MATRIX)
+
+        back = matrix(stencil.Float(id_), 1)
 
         def seen(object_: Float, offset: list[Float]) -> list[Float]:
             """Where a point was as the surface saw it, from the surface."""
             point = [p + o for p, o in zip(position, offset)]
-            there = _moved(back, _moved(_matrix(stencil, table[0], object_, blocked, 0), point))
+            there = _moved(back, _moved(matrix(object_, 0), point))
             return [q - p for p, q in zip(position, there)]
 
         y, b = seen(light_id, light), seen(blocker_id, [share * o for o in light])
@@ -125,15 +128,6 @@ def shadow_motion(stencil: Stencil, hits: list[Float], surface: list[Float], pos
 
     moves, du = weighted_sums(stencil, blocked, 1, 2, follow)
     return [moves, *du]
-
-
-def _matrix(stencil: Stencil, table: Float, object_: Float, wanted: Any,
-            inverse: int) -> list[Float]:
-    start = stencil.UInt(dr.select(wanted, object_, 0)) * (_ROW // _EIGHT) + 2 * inverse
-    words: list[Float] = []
-    for i in range(2):
-        words += list(dr.gather(stencil.ArrayXf, table, start + i, shape=(_EIGHT, stencil.lanes)))
-    return words
 
 
 def _moved(matrix: list[Float], point: list[Float]) -> list[Float]:

@@ -57,7 +57,7 @@ def window_taps(stencil: Stencil, radius: int,
         y, x = row + dy, column + dx
         inside = (y >= 0) & (y < stencil.height) & (x >= 0) & (x < stencil.width)
         lane = stencil.UInt(dr.select(inside, y * stencil.stride + x, 0))
-        words = dr.gather(stencil.ArrayXf, table, lane, shape=(WORDS, stencil.lanes))
-        return inside, stencil.Float(dy), stencil.Float(dx), [words[k] for k in range(WORDS)]
+        return (inside, stencil.Float(dy), stencil.Float(dx),
+                stencil.unpack(table, lane, WORDS))
 
     return tap

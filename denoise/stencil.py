@@ -37,6 +37,7 @@ Offset = tuple[int, int]
 _TAIL = 64  # floats after the last lane that a vector load may touch
 _LINE = 16  # floats in a cache line
 _SHIFT = 7  # floats from a cache line to the first pixel: no filter has taps 7 to the left
+_GATHERED = 8  # words that one packed gather brings, at most
 _SETS = 64  # sets of a first-level cache: lines that far apart displace each other
 
 
@@ -147,6 +148,17 @@ class Stencil:
         packed = dr.empty(self.Float, self.lanes * len(words))
         dr.scatter(packed, self.ArrayXf(words), dr.arange(self.UInt, self.lanes))
         return packed
+
+    def unpack(self, packed: Float, index: Any, size: int, count: int | None = None) -> list[Float]:
+        """The first `count` words (default: all) of the records of `size` words at an index.
+
+        `size` is a multiple of 8, which is what one gather brings.
+        """
+        count, words = count or size, []
+        for chunk in range(-(-count // _GATHERED)):
+            at = self.UInt(index) * (size // _GATHERED) + chunk
+            words += list(dr.gather(self.ArrayXf, packed, at, shape=(_GATHERED, self.lanes)))
+        return words[:count]
 
     def constant(self, value: float) -> Float:
         """An array of lanes that holds one number."""

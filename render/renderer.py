@@ -112,12 +112,12 @@ class Renderer:
             rays = pixel_rays(self.stage, self.height, self.width)
             ray, depth_per_length = rays.at(*self._centres(pixel))
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
-            unit = dr.opaque(mi.Float, self.stage.unit)
             planes = {}
             if set(channels) & {*RADIANCE, *SPLIT, *SHADOW, *GLOSS}:
                 sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
                 radiance = trace(scene, ray, pi, sampler, self.scene.max_depth,
                                  self.direct == "resampled")
+                unit = dr.opaque(mi.Float, self.stage.unit)
                 planes = {
                     "color": radiance.emission + radiance.direct + radiance.indirect,
                     "emission": radiance.emission,
