@@ -87,8 +87,8 @@ class Atrous(OnLanes):
             offsets = [(dy << i, dx << i) for dy, dx in (*window(2), (0, 0))]
             level_taps.append((signal.taps(offsets), guides.taps(offsets)))
         near = [*window(VARIANCE_RADIUS), (0, 0)]
-        return AtrousState(stencil, signal, guides, level_taps, signal.taps(window(1)),
-                           (signal.taps(near), guides.taps(near)),
+        return AtrousState(stencil, signal, guides, level_taps, signal.taps(window(1), [3]),
+                           (signal.taps(near, [1]), guides.taps(near, [3])),
                            [stencil.opaque(1 << i) for i in range(self.levels)],
                            Step(estimate_variance), [Step(level) for _ in range(self.levels)])
 
@@ -142,15 +142,15 @@ def estimate_variance(signal: Taps, guides: Taps, plane: list[Float]) -> Float:
     Sums run over differences from the pixel itself, which keeps digits on bright pixels.
     """
     gx, gy, scale = plane
-    lum, inverse_depth, limit = signal.at(-1)[1], guides.at(-1)[3], 1 / scale
+    (lum,), (inverse_depth,), limit = signal.at(-1), guides.at(-1), 1 / scale
     float_t = type(lum)
     count, sum1, sum2, row = float_t(1), float_t(0), float_t(0), inverse_depth
     for i, (dy, dx) in enumerate(window(VARIANCE_RADIUS)):
         if dx == -VARIANCE_RADIUS:
             row = dr.fma(gy, float(dy), inverse_depth)
-        distance = dr.abs(guides.at(i)[3] - dr.fma(gx, float(dx), row))
+        distance = dr.abs(guides.at(i)[0] - dr.fma(gx, float(dx), row))
         on_plane = dr.select(distance < limit, float_t(1), 0)
-        d = signal.at(i)[1] - lum
+        d = signal.at(i)[0] - lum
         counted = d * on_plane
         count, sum1, sum2 = count + on_plane, sum1 + counted, dr.fma(d, counted, sum2)
         signal.next()
@@ -164,7 +164,7 @@ def luminance_scale(taps: Taps, variance: list[Float], numbers: list[Float]) -> 
     epsilon, sigma, *_ = numbers
     blurred = variance[0] * BINOMIAL[0]**2
     for i, (dy, dx) in enumerate(window(1)):
-        blurred = dr.fma(taps.at(i)[3], BINOMIAL[abs(dy)] * BINOMIAL[abs(dx)], blurred)
+        blurred = dr.fma(taps.at(i)[0], BINOMIAL[abs(dy)] * BINOMIAL[abs(dx)], blurred)
     return 1 / dr.fma(sigma, dr.sqrt(blurred), epsilon)
 
 

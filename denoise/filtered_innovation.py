@@ -183,7 +183,7 @@ class Level:
     def make(i: int, values: Planes, count: int, surfaces: Planes,
              function: Callable[..., list[Float]]) -> Level:
         offsets = [(dy << i, dx << i) for dy, dx in (*window(1), (0, 0))]
-        return Level((values.taps(offsets, count), surfaces.taps(offsets)),
+        return Level((values.taps(offsets, range(count)), surfaces.taps(offsets)),
                      values.stencil.opaque(1 << i), Step(function))
 
 

@@ -13,7 +13,7 @@ The assignment's P' V' M'_id M_id^-1 X, in three steps that keep the digits:
        x' - x = (d_x - u_x d_w) / (1 + d_w),  z' = z (1 + d_w).
 
 A pixel of the previous frame (a tap) counts if its object is the same, its normal is near the
-expected n' = R n (R the rotation of T), and it lies near the expected tangent plane:
+expected n' = A^-T n, and it lies near the expected tangent plane:
 |n' . (X'_tap - X')| < plane_tolerance z'. Bilinear reprojection weighs the taps that pass and
 renormalises; with less than `LEAST_WEIGHT` there is no history.
 
@@ -34,11 +34,11 @@ from render.errors import InputError
 from render.frame import Frame
 
 from .stencil import Float, Stencil
-from .surface import camera_from_screen, dot, transform
+from .surface import camera_from_screen, cross, dot, screen_from_camera, transform
 
 LEAST_WEIGHT = 0.01
 WORDS = 8            # a pixel of packed history: colour 3, object ID, normal 3, depth
-_ROW = 32            # floats an object in the motion table: E and S' t (3x4), R (3x3, rows of 4)
+_ROW = 16            # floats an object in the motion table: E | S' t (3x4), row by row, padded
 _FEWEST_OBJECTS = 64
 
 
@@ -57,25 +57,18 @@ class Tests:
 
 
 def motion_table(previous: Frame, current: Frame) -> np.ndarray:
-    """(objects, 32) float32: E | S' t and R of each object; see the module's header.
+    """(objects, 16) float32: E | S' t of each object, then zeros; see the module's header.
 
     An object whose matrix is singular, or that only one of the frames has, gets NaN: no history.
     """
-    s_previous = np.linalg.inv(camera_from_screen(previous))
-    b = camera_from_screen(current)
+    s_previous = screen_from_camera(previous)
     motion = world_motions(previous, current)
     t = previous.camera_from_world @ motion @ np.linalg.inv(current.camera_from_world)
-    moved = (motion != np.eye(4)).any((1, 2)) | (not _same_view(previous, current))
+    e = s_previous @ t[:, :3, :3] @ camera_from_screen(current) - np.eye(3)
     table = np.zeros((len(t), _ROW))
-    e = np.where(moved[:, None, None], s_previous @ t[:, :3, :3] @ b - np.eye(3), 0)
-    shift = np.where(moved[:, None], t[:, :3, 3] @ s_previous.T, 0)
-    table[:, :12] = np.concatenate([e, shift[..., None]], 2).reshape(-1, 12)
-    # What normals turn by: the inverse transpose, its scale taken out.
-    with np.errstate(invalid="ignore"):  # of NaN
-        scale = np.cbrt(np.abs(np.linalg.det(t[:, :3, :3])))
-    turn = inverses(t[:, :3, :3]).transpose(0, 2, 1) * scale[:, None, None]
-    table[:, 12:24].reshape(-1, 3, 4)[..., :3] = turn
-    table[np.isnan(table).any(1)] = np.nan
+    table[:, :12] = np.concatenate([e, (t[:, :3, 3] @ s_previous.T)[..., None]], 2).reshape(-1, 12)
+    if _same_view(previous, current):
+        table[(motion == np.eye(4)).all((1, 2))] = 0
     return table.astype(np.float32)
 
 
@@ -115,7 +108,7 @@ def load_table(table: np.ndarray, stencil: Stencil) -> Float:
 
 def motion_between(previous: Frame, current: Frame,
                    stencil: Stencil) -> tuple[Float, list[Float]]:
-    """The motion table on the device, and B'^T, nine numbers row by row: what `locate` asks for.
+    """What `locate` asks for: the motion table on the device; B^T and S'^T, nine numbers each.
 
     Raises:
         InputError: the frames cannot follow one another, or their matrices do not project.
@@ -125,7 +118,9 @@ def motion_between(previous: Frame, current: Frame,
             f"frame {current.index} has {len(current.world_from_object)} objects, the frame "
             f"before it {len(previous.world_from_object)}: they are not of one sequence")
     return (load_table(motion_table(previous, current), stencil),
-            [stencil.opaque(x) for x in camera_from_screen(previous).T.ravel()])
+            [stencil.opaque(x) for matrix in (camera_from_screen(current),
+                                              screen_from_camera(previous))
+             for x in matrix.T.ravel()])
 
 
 def without_images(frame: Frame) -> Frame:
@@ -171,19 +166,19 @@ def locate(stencil: Stencil, surface: list[Float], table: Float, dual: list[Floa
     float_t = stencil.Float
     id_, *normal, depth = surface
     known = (id_ >= 0) & (id_ < dr.width(table) // _ROW)
-    (ex, tx, ey, ty, ew, tw), rotation = _motion(stencil, table, dr.select(known, id_, 0))
+    words = stencil.unpack(table, dr.select(known, id_, 0), _ROW, 12)
+    e, translation = [words[at:at + 3] for at in (0, 4, 8)], words[3::4]
     row, column = stencil.pixel()
     u = [float_t(column) + 0.5 + shift[0], float_t(row) + 0.5 + shift[1], float_t(1)]
     inverse_depth = 1 / depth
-    dx, dy, dw = (dr.fma(t, inverse_depth, dot(e, u)) for e, t in ((ex, tx), (ey, ty), (ew, tw)))
+    dx, dy, dw = (dr.fma(t, inverse_depth, dot(row, u)) for row, t in zip(e, translation))
     scale = 1 + dw
     shrink = 1 / scale
     x, y = dr.fma(dx - u[0] * dw, shrink, u[0]), dr.fma(dy - u[1] * dw, shrink, u[1])
     inside = (known & (scale > 1e-6) & (x >= 0) & (x < stencil.width)
               & (y >= 0) & (y < stencil.height))
     x, y = dr.select(inside, x, 0.5), dr.select(inside, y, 0.5)
-    expected = transform(rotation, normal)
-    plane = transform([dual[:3], dual[3:6], dual[6:]], expected)  # n' . X' = z' plane . u'
+    expected, plane = _turned(e, normal, dual)
     depth = depth * scale
     return Place(x, y, inside, float_t(id_), expected, dot(normal, normal) <= 0.25, plane,
                  depth * dot(plane, [x, y, float_t(1)]), plane_tolerance * depth)
@@ -229,11 +224,22 @@ def reproject(stencil: Stencil, surface: list[Float], table: Float, dual: list[F
     return [s * scale for s in sums], valid
 
 
-def _motion(stencil: Stencil, table: Float, object_: Any) -> tuple[list[Any], list[list[Float]]]:
-    """(row of E, row of S' t) three times over, and R's rows, of each pixel's object."""
-    words = stencil.unpack(table, object_, _ROW, 24)
-    motion = [part for at in (0, 4, 8) for part in (words[at:at + 3], words[at + 3])]
-    return motion, [words[at:at + 3] for at in (12, 16, 20)]
+def _turned(e: list[list[Float]], normal: list[Float],
+            dual: list[Float]) -> tuple[list[Float], list[Float]]:
+    """n', and B'^T n' with which n' . X' = z' (B'^T n') . u'.
+
+    With F = I + E, a surface's B^T n turns by F^-T: its cofactors over its determinant, of which
+    the sign matters alone.
+    """
+    to_screen, to_camera = ([dual[i + at:i + at + 3] for at in (0, 3, 6)] for i in (0, 9))
+    f = [[row[c] + 1 if c == r else row[c] for c in range(3)] for r, row in enumerate(e)]
+    flat = transform(to_screen, normal)
+    cofactors = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])]
+    plane = [dr.mulsign(x, dot(f[0], cofactors[0])) for x in transform(cofactors, flat)]
+    turned = transform(to_camera, plane)
+    length2 = dot(turned, turned)
+    scale = dr.rsqrt(dr.select(length2 > 0, length2, 1))
+    return [x * scale for x in turned], [x * scale for x in plane]
 
 
 def _pair(first: Float, fraction: Float, size: int) -> tuple[list[Float], list[Float]]:

@@ -160,6 +160,17 @@ class Stencil:
             words += list(dr.gather(self.ArrayXf, packed, at, shape=(_GATHERED, self.lanes)))
         return words[:count]
 
+    def rows_around(self, arrays: Sequence[Float], margin: int) -> Taps:
+        """A kernel's results, evaluated over `margin` rows more on either side, seen from the
+        2 margin + 1 rows around each pixel: taps without a copy."""
+        starts = [row * self.stride for row in range(2 * margin + 1)]
+        if self.layout == "gather":
+            return Taps([], list(arrays), [dr.opaque(self.UInt, start) for start in starts],
+                        self.lanes, self.backend)
+        memory = [array.numpy() for array in arrays]
+        return Taps([[self.Float(m[start:start + self.lanes]) for m in memory] for start in starts],
+                    [], [], self.lanes, self.backend)
+
     def constant(self, value: float) -> Float:
         """An array of lanes that holds one number."""
         return dr.opaque(self.Float, float(value), self.lanes)
@@ -221,25 +232,31 @@ class Planes:
             else:
                 np.copyto(s.rows(target), s.rows(array.numpy()))
 
-    def taps(self, offsets: Sequence[Offset], count: int | None = None) -> Taps:
-        """The (first `count`) planes seen from the neighbours at offsets (dy, dx)."""
-        s = self.stencil
-        if any(max(abs(dy), abs(dx)) > s.reach for dy, dx in offsets):
-            raise ValueError(f"a tap lies farther than the stencil's reach of {s.reach} pixels")
-        starts = [s.top + dy * s.stride + dx for dy, dx in offsets]
-        if s.layout == "gather":
-            at = [dr.opaque(s.UInt, start) for start in starts]
-            return Taps([], self._arrays[:count], at, s.lanes, s.backend)
-        channels = range(len(self._memory))[:count]
-        return Taps([[self._view(c, start) for c in channels] for start in starts], [], [],
-                    s.lanes, s.backend)
+    def taps(self, offsets: Sequence[Offset], channels: Sequence[int] | None = None,
+             margin: int = 0) -> Taps:
+        """Planes (default: all) seen from the neighbours at offsets (dy, dx).
 
-    def _view(self, channel: int, start: int) -> Float:
+        Args:
+            margin: rows above and below the image that are lanes too.
+        """
+        s = self.stencil
+        if any(max(abs(dy) + margin, abs(dx)) > s.reach for dy, dx in offsets):
+            raise ValueError(f"a tap lies farther than the stencil's reach of {s.reach} pixels")
+        starts = [s.top + (dy - margin) * s.stride + dx for dy, dx in offsets]
+        lanes = s.lanes + 2 * margin * s.stride
+        if s.layout == "gather":
+            arrays = self._arrays if channels is None else [self._arrays[c] for c in channels]
+            return Taps([], arrays, [dr.opaque(s.UInt, start) for start in starts], lanes,
+                        s.backend)
+        channels = range(len(self._memory)) if channels is None else channels
+        return Taps([[self._view(c, start, lanes) for c in channels] for start in starts], [], [],
+                    lanes, s.backend)
+
+    def _view(self, channel: int, start: int, lanes: int) -> Float:
         """The same offset gives the same variable, so that a frozen function sees the alias."""
-        key = (channel, start, self.stencil.lanes)
+        key = (channel, start, lanes)
         if key not in self._views:
-            memory = self._memory[channel][start:start + self.stencil.lanes]
-            self._views[key] = self.stencil.Float(memory)
+            self._views[key] = self.stencil.Float(self._memory[channel][start:start + lanes])
         return self._views[key]
 
 
@@ -307,28 +324,35 @@ class Step:
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        called_with: list[tuple[Any, ...]] = [()]  # by the call that is being made, if any
+        call = _Call()
 
-        def record(*arguments: Any) -> Any:
+        def record(*arrays: Any) -> Any:
             return function(*(a.seen_as(b) if isinstance(a, Taps) else b
-                              for a, b in zip(called_with[0], arguments)))
+                              for a, b in zip(call.arguments, arrays)))
 
-        self._called_with = called_with
-        self._frozen = dr.freeze(record, state_fn=lambda *_: _sizes(*called_with[0]),
+        self._call = call
+        self._frozen = dr.freeze(record, state_fn=lambda *_: _sizes(*call.arguments),
                                  warn_after=1000)
 
     def __call__(self, *arguments: Any) -> Any:
-        self._called_with[0] = arguments
+        self._call.arguments = arguments
         try:
             with _no_collection():
                 # Dr.Jit walks lists twice as fast as it walks dataclasses.
                 return self._frozen(*(a.arrays if isinstance(a, Taps) else a for a in arguments))
         finally:
-            self._called_with[0] = ()
+            self._call.arguments = ()
 
     @property
     def recordings(self) -> int:
         return self._frozen.n_recordings
+
+
+class _Call:
+    """The arguments of the call that is being made. Dr.Jit walks all that a recorded function's
+    closure holds, at every call, but not into an object such as this."""
+
+    arguments: tuple[Any, ...] = ()
 
 
 @contextmanager

@@ -160,6 +160,10 @@ def dot(a: list[Float], b: list[Float]) -> Float:
     return dr.fma(a[0], b[0], dr.fma(a[1], b[1], a[2] * b[2]))
 
 
+def cross(a: list[Float], b: list[Float]) -> list[Float]:
+    return [dr.fma(a[i], b[j], -(a[j] * b[i])) for i, j in ((1, 2), (2, 0), (0, 1))]
+
+
 def transform(matrix: list[list[Float]], vector: list[Float]) -> list[Float]:
     return [dot(row, vector) for row in matrix]
 

@@ -207,7 +207,7 @@ class Levels:
         for i in range(levels):
             offsets = [(dy << i, dx << i) for dy, dx in window(2)]
             taps.append((signal.taps(offsets), guides.taps(offsets)))
-        return Levels(signal, signal.taps(window(1)), taps,
+        return Levels(signal, signal.taps(window(1), [3]), taps,
                       [stencil.opaque(1 << i) for i in range(levels)],
                       [Step(luminance_scale) for _ in taps], [Step(filter_level) for _ in taps])
 

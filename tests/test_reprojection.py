@@ -1,9 +1,14 @@
+from dataclasses import replace
+
+import drjit as dr
 import numpy as np
 import pytest
 from synthetic import make_frame, translation, turn, with_images
 
 from denoise import oracles
-from denoise.reprojection import motion_table
+from denoise.reprojection import locate, motion_between, motion_table
+from denoise.stencil import Stencil
+from denoise.surface import read_surface
 from denoise.temporal import Temporal
 
 # With alpha tiny and a clamp box that never binds, what comes out is the history itself.
@@ -44,6 +49,40 @@ def test_agrees_with_the_chain_of_matrices_in_float64(name):
     both = np.isfinite(expected) & np.isfinite(result)
     assert both.mean() > 0.5
     np.testing.assert_allclose(result[both], expected[both], atol=2e-3)
+
+
+@pytest.mark.parametrize("board", [
+    np.eye(4), turn(0.4) @ translation(0.2, 0, 0), np.diag([1.3, 0.8, 1, 1]),
+    turn(0.2) @ np.diag([2, 2, 2, 1.0]), np.array([[1, .3, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0],
+                                                   [0, 0, 0, 1.0]]),
+    np.diag([-1.0, 1, 1, 1])],
+    ids=["still", "turns", "stretches", "grows", "shears", "is mirrored"])
+def test_planes_turn_by_the_inverse_transpose_of_the_motion(board):
+    """A normal expected in the previous frame, and the plane that its neighbours must lie on."""
+    tilted = turn(0.5)
+    previous = make_frame(9, 11, board=tilted)
+    frame = make_frame(9, 11, index=1, camera=translation(0.1, 0, 0.2) @ turn(0.1), board=tilted)
+    frame = replace(frame, world_from_object=frame.world_from_object
+                    @ np.stack([np.eye(4), np.linalg.inv(board)]))
+    stencil = Stencil(9, 11, 1)
+    surface = read_surface(frame, stencil)
+    near = [surface.id, *surface.normal, surface.depth]
+    place = locate(stencil, near, *motion_between(previous, frame, stencil), stencil.opaque(0.02))
+    motion = (previous.camera_from_world @ previous.world_from_object
+              @ np.linalg.inv(frame.world_from_object) @ np.linalg.inv(frame.camera_from_world))
+    turning = np.linalg.inv(motion[:, :3, :3]).transpose(0, 2, 1)
+    normal = stencil.image(surface.normal)
+    expected = (turning[frame["id"]] @ normal[..., None])[..., 0]
+    seen = frame["id"] >= 0
+    expected[seen] /= np.linalg.norm(expected[seen], axis=-1, keepdims=True)
+    np.testing.assert_allclose(stencil.image(place.normal)[seen], expected[seen], atol=2e-6)
+    position = stencil.image(surface.position)
+    moved = (motion[frame["id"]] @ np.pad(position, ((0, 0), (0, 0), (0, 1)),
+                                          constant_values=1)[..., None])[..., :3, 0]
+    inside = seen & (stencil.image([dr.select(place.inside, stencil.Float(1), 0)]) > 0)
+    assert inside.mean() > 0.3
+    np.testing.assert_allclose(stencil.image([place.offset])[inside],
+                               (expected * moved).sum(-1)[inside], rtol=1e-5)
 
 
 @pytest.mark.parametrize("nearest", [False, True])

@@ -49,6 +49,41 @@ def test_taps_are_the_shifted_image_with_the_outside_value_around_it(layout, hei
         np.testing.assert_array_equal(stencil.image(taps.at(t)), expected)
 
 
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_taps_of_some_planes_over_a_margin(layout):
+    stencil = stencil_of(5, 6, 3, layout)
+    images = np.random.default_rng(0).random((3, 5, 6)).astype(np.float32)
+    planes = stencil.planes([-1.0, -2.0, -3.0])
+    stored = [plane for image in images for plane in lanes(stencil, image)]
+    dr.eval(stored)
+    planes.store(stored)
+    taps = planes.taps([(1, 0)], [2, 0], margin=2)
+    assert taps.lanes == (5 + 4) * stencil.stride
+    for tap, c, outside in zip(taps.at(0), (2, 0), (-3, -1)):
+        rows = tap.numpy().reshape(9, stencil.stride)[:, :6]
+        np.testing.assert_array_equal(rows, np.pad(images[c], ((1, 3), (0, 0)),
+                                                   constant_values=outside))
+    with pytest.raises(ValueError, match="reach of 3"):
+        planes.taps([(2, 0)], margin=2)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_rows_around_are_views_of_what_a_kernel_gave(layout):
+    stencil = stencil_of(4, 5, 2, layout)
+    tall = np.random.default_rng(0).random((8, stencil.stride)).astype(np.float32)
+    array = stencil.Float(tall.ravel()) + 0
+    dr.eval(array)
+    taps = stencil.rows_around([array], 2)
+    for i in range(5):
+        (seen,) = taps.at(i)
+        np.testing.assert_array_equal(stencil.image([seen]), tall[i:i + 4, :5])
+        assert layout == "gather" or seen.numpy().ctypes.data == (
+            array.numpy().ctypes.data + 4 * i * stencil.stride)
+    del array, tall
+    gc.collect()
+    assert np.isfinite(taps.at(4)[0].numpy()).all()  # memory that is still there
+
+
 def test_storing_again_is_seen_by_taps_made_before():
     stencil = stencil_of(4, 5, 1)
     planes = stencil.planes([0.0])
@@ -132,7 +167,7 @@ def test_a_step_holds_no_arguments_between_calls_and_goes_when_it_is_dropped():
     step = Step(lambda arrays: [arrays[0] + 1])
     step([stencil.constant(1)])
     assert not any(isinstance(value, Step) for value in vars(step).values())
-    assert step._called_with == [()]
+    assert step._call.arguments == ()
     gc.disable()  # without the help of the cycle collector
     try:
         there = weakref.ref(step)
@@ -140,6 +175,25 @@ def test_a_step_holds_no_arguments_between_calls_and_goes_when_it_is_dropped():
         assert there() is None
     finally:
         gc.enable()
+
+
+def test_dr_jit_walks_the_arguments_of_a_step_once():
+    """It walks what the recorded function's closure holds as well, at every call."""
+    stencil = stencil_of(5, 7, 1)
+    step = Step(lambda arrays: [arrays[0] + 1])
+    frozen, inputs = step._frozen.frozen, []
+    step._frozen.frozen = lambda given: inputs.append(given) or frozen(given)
+    array = stencil.constant(1)
+    step([array])
+    assert "nonlocals" in inputs[0]
+    assert array is inputs[0]["args"][0][0]
+
+    def holds(value):
+        return (value is array or (isinstance(value, (list, tuple)) and any(map(holds, value)))
+                or (isinstance(value, dict) and any(map(holds, value.values()))))
+
+    assert not holds(inputs[0]["nonlocals"])
+    assert not holds(inputs[0]["globals"])
 
 
 @pytest.mark.parametrize("alias_first", [True, False])
@@ -238,13 +292,13 @@ def test_a_second_state_compiles_nothing():
 
 def test_the_motion_table_grows_with_the_scene():
     stencil = stencil_of(2, 2, 1)
-    table = np.arange(70 * 32, dtype=np.float32).reshape(70, 32)
+    table = np.arange(70 * 16, dtype=np.float32).reshape(70, 16)
     tables = [load_table(table, stencil) for _ in range(8)]
     assert {t.numpy().ctypes.data % 64 for t in tables} == {0}  # packed gathers need it
     loaded = tables[0].numpy()
-    assert loaded.size == 128 * 32
-    np.testing.assert_array_equal(loaded[:70 * 32], table.ravel())
-    assert np.isnan(loaded[70 * 32:]).all()
+    assert loaded.size == 128 * 16
+    np.testing.assert_array_equal(loaded[:70 * 16], table.ravel())
+    assert np.isnan(loaded[70 * 16:]).all()
 
 
 def test_timed_waits_for_kernels():

@@ -1,3 +1,4 @@
+import drjit as dr
 import numpy as np
 import pytest
 from kernels import compiled, taking_turns
@@ -5,7 +6,8 @@ from synthetic import make_frame, noisy, translation, turn, with_images
 
 from denoise import oracles
 from denoise.stencil import Stencil
-from denoise.temporal import Temporal, window_moments
+from denoise.temporal import Temporal
+from denoise.window_moments import RowMoments, window_moments
 from render.errors import InputError
 
 
@@ -19,10 +21,10 @@ def run(method, frames):
 def moments(color, radius):
     height, width, _ = color.shape
     stencil = Stencil(height, width, radius)
-    planes = stencil.planes([0.0] * 3)
-    side = range(-radius, radius + 1)
-    planes.store([x + 0 for x in stencil.load(color.astype(np.float32))])
-    mean, sigma = window_moments(stencil, planes.taps([(dy, dx) for dy in side for dx in side]))
+    lanes = [x + 0 for x in stencil.load(color.astype(np.float32))]
+    dr.eval(lanes)
+    mean, sigma = window_moments(
+        stencil, stencil.rows_around(RowMoments.make(stencil, radius)(lanes), radius))
     return stencil.image(mean), stencil.image(sigma)
 
 
