@@ -36,9 +36,9 @@ from .reprojection import motion_between, without_images
 from .shadow_motion import (
     AROUND,
     CHOICE,
+    follow_shadows,
     has_shadow_rays,
     read_shadow_rays,
-    shadow_motion,
 )
 from .signals import USED, Signals, check_signals, read_signals
 from .stencil import Float, Planes, Stencil, Step, Taps, window
@@ -70,7 +70,10 @@ class FilteredInnovation(OnLanes):
         min_cosine, plane_tolerance: tests of history, see `reprojection.py`.
         demodulate: filter diffuse light without texture, where frames have albedo.
         gloss: glossy light as a signal of its own, where frames have it.
-        follow_shadows: visibility's history where the shadow was, where frames say.
+        penumbra: reach of visibility's last filter, deviations in widths of the penumbra, where
+            frames say.
+        follow_shadows: visibility's history where the shadow was, and `penumbra`; where frames
+            have shadow rays.
     """
 
     light_alpha: float = 0.05
@@ -84,7 +87,7 @@ class FilteredInnovation(OnLanes):
     sharp_smoothing: int = 3
     sharp_levels: int = 3
     light_sigma: float = 8.0
-    visibility_sigma: float = 5.0
+    visibility_sigma: float = 6.0
     fade: float = 4.0
     sigma_plane: float = 0.005
     longest: float = 64.0
@@ -92,6 +95,7 @@ class FilteredInnovation(OnLanes):
     plane_tolerance: float = 0.02
     demodulate: bool = True
     gloss: bool = True
+    penumbra: float = 0.6
     follow_shadows: bool = True
 
     uses: ClassVar[tuple[str, ...]] = (*USED, *SHADOW)
@@ -107,7 +111,7 @@ class FilteredInnovation(OnLanes):
         check_range(self, "longest", 1.0, 1e6)
         check_range(self, "min_cosine", -1.0, 1.0)
         check_positive(self, "light_sigma", "visibility_sigma", "fade", "sigma_plane",
-                       "plane_tolerance")
+                       "penumbra", "plane_tolerance")
 
     @property
     def reach(self) -> int:
@@ -137,8 +141,8 @@ class FilteredInnovation(OnLanes):
         works.surfaces.store([inverse_depth, id_])
         shadows = []
         if rays:
-            shadows = works.through(works.around, works.shadow_motion(
-                rays.hits, near, surface.position, rays.table, rays.matrices), plane)
+            shadows = works.through(works.around, works.follow_shadows(
+                rays.hits, near, surface.position, rays.table, rays.sizes, rays.matrices), plane)
         innovation, energies, carried, seen, other = works.look_back(
             signal, near, guides, [table], dual, [state.records], shadows, limits)
         works.surfaces.store(seen)
@@ -147,13 +151,14 @@ class FilteredInnovation(OnLanes):
         follow = self.follow if signals.unshadowed else 1.0
         numbers = [stencil.opaque(x) for x in (
             follow, self.doubt, self.sharp_follow, self.renewal, self.fade,
+            LOG2E / (2 * self.penumbra**2),
             *_each(works.sizes, self.light_alpha, self.visibility_alpha))]
-        values, fade = works.merge(signal, innovation, smooth, energies, carried, other,
-                                   guides, numbers)
+        values, weaker = works.merge(signal, innovation, smooth, energies, carried, other,
+                                     guides, shadows[3:], numbers)
         sigmas = [stencil.opaque(math.sqrt(LOG2E) / x)
                   for x in _each(works.sizes, self.light_sigma, self.visibility_sigma)]
         works.surfaces.store([inverse_depth])
-        parts = works.filter(values, plane, fade, sigmas)
+        parts = works.filter(values, plane, weaker, sigmas)
         records = works.pack(near, carried[:1], values)
         return signals.color(parts), replace(state, works=works, records=records,
                                             previous=without_images(frame))
@@ -203,7 +208,7 @@ class Works:
     around: list[Level]
     smoothing: list[Level]
     levels: list[Level]
-    shadow_motion: Step
+    follow_shadows: Step
     look_back: Step
     merge: Step
     pack: Step
@@ -224,7 +229,7 @@ class Works:
             return Level.make(i, values, count, surfaces, lambda *a: smooth_level(spreads, *a))
 
         def around(i: int) -> Level:
-            return Level.make(i, values, 3, surfaces, lambda *a: smooth_level((), *a))
+            return Level.make(i, values, 5, surfaces, lambda *a: smooth_level((), *a))
 
         def last(i: int) -> Level:
             some = sizes if i < method.sharp_levels else sizes[:1]
@@ -236,7 +241,7 @@ class Works:
             sizes, shadows, surfaces, values, [around(i) for i in AROUND],
             [smoothing(i) for i in range(method.smoothing)],
             [last(i) for i in range(method.levels)],
-            Step(lambda *a: shadow_motion(stencil, *a)),
+            Step(lambda *a: follow_shadows(stencil, *a)),
             Step(lambda *a: look_back(stencil, sizes, *a)),
             Step(lambda *a: merge(stencil, sizes, *a)),
             Step(lambda *a: pack_history(stencil, sizes, *a)))
@@ -264,10 +269,10 @@ class Works:
         spread, light, excess, last_spread, sharp, e, energies = smooth
         return [*spread, *last_spread, *light, *sharp, *excess, *e], energies
 
-    def filter(self, values: list[Float], plane: list[Float], fade: list[Float],
+    def filter(self, values: list[Float], plane: list[Float], weaker: list[Float],
                sigmas: list[Float]) -> list[list[Float]]:
         """The last filter of each signal; values: planes of each signal and its variance."""
-        values = self.through(self.levels, values, plane, fade, sigmas)
+        values = self.through(self.levels, values, plane, weaker, sigmas)
         starts = [sum(self.sizes[:s]) + s for s in range(len(self.sizes))]
         return [values[start:start + size] for start, size in zip(starts, self.sizes)]
 

@@ -33,7 +33,8 @@ of h compares luminance too,
 
     w = h exp(-distance(q, p's plane) / (sigma_plane z(p)) - ((l(p) - l(q)) / (sigma s))^2)
 
-and its last level fades out as the history grows. A pixel of another object counts for two fifths.
+and its last level fades out as the history grows. Visibility is filtered no farther than shadows
+are soft: `penumbra.py`. A pixel of another object counts for two fifths.
 Normals are not compared: where they differ much the tangent plane is soon left, and at a crease, or
 on a leaf, a neighbour turned away is a better guess than one sample (+0.2 to 0.9 dB for
 normal_power 0 instead of 4 and 128).
@@ -54,8 +55,9 @@ import drjit as dr
 from .atrous import EPSILON, LOG2E
 from .exponential import exp2
 from .history import look_up, pack_records
+from .penumbra import narrowness
 from .reprojection import locate
-from .shadow_motion import look_up_shadow
+from .shadow_motion import FEWEST, look_up_shadow
 from .sparse import tabulate, weighted_sums, window_taps
 from .stencil import Float, Offset, Stencil, Taps, window
 
@@ -169,15 +171,18 @@ def surface_exponent(surfaces: Taps, plane: list[Float],
 
 def merge(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], innovation: list[Float],
           smooth: list[Float], energies: list[Float], carried: list[Float], other: list[Float],
-          guides: list[Float], numbers: list[Float]) -> tuple[list[Float], list[Float]]:
-    """The new history, a signal's planes and its s^2 each; and how the last filter fades out.
+          guides: list[Float], penumbras: list[Float],
+          numbers: list[Float]) -> tuple[list[Float], list[Float]]:
+    """The new history, a signal's planes and its s^2 each; and what makes the last filter weaker:
+    log2 of its fading, and `narrowness` if there are shadow rays.
 
     Args:
         smooth: Q of the first and the last signal, S[e], and S of what is in `other`: how much
             greater e^2 is, and e.
         energies: W[l(e)^2]. carried, other: as from `look_back`.
-        guides: 1/z, its slopes (2) and scale, of all pixels. numbers: g, k, g', r,
-            frames until the filter has faded, and each signal's alpha.
+        guides: 1/z, its slopes (2) and scale, of all pixels. penumbras: `sharpness`, smoothed, or
+            empty. numbers: g, k, g', r, frames until the filter has faded, scale of `narrowness`,
+            and each signal's alpha.
     """
     length, *variances = carried
     spread, last_spread, *smooth = smooth
@@ -188,7 +193,7 @@ def merge(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], innovat
         smooth[-1] = dr.select(better, wide_other, smooth[-1])
         variances[-1] = dr.select(better, other[1], variances[-1])
         energies = [*energies[:-1], dr.maximum(energies[-1] + dr.minimum(excess, 0), 0)]
-    least, doubt, sharp, renewal, frames, *alphas = numbers
+    least, doubt, sharp, renewal, frames, scale, *alphas = numbers
     new = length < 1.5
     first = spatial_variances(stencil, sizes, signal, new, guides)
     values, at = [], 0
@@ -208,7 +213,8 @@ def merge(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], innovat
                                                     energies[s] * LEAST_NOISE))
         values.append(dr.fma(dr.square(1 - a), variances[s], dr.square(a) * noise))
         at += size
-    return values, [_fade_out(length, frames)]
+    narrow = [narrowness(penumbras, scale, FEWEST)] if penumbras else []
+    return values, [_fade_out(length, frames), *narrow]
 
 
 def _certainty(spread: Float, wide: Float, doubt: Float) -> Float:
@@ -261,14 +267,14 @@ def spatial_variances(stencil: Stencil, sizes: tuple[int, ...], signal: list[Flo
 
 
 def guided_level(sizes: tuple[int, ...], fading: tuple[bool, ...], values: Taps,
-                 surfaces: Taps, plane: list[Float], spacing: list[Float], fade: list[Float],
+                 surfaces: Taps, plane: list[Float], spacing: list[Float], weaker: list[Float],
                  sigmas: list[Float]) -> list[Float]:
     """One level of the last filter over the signals of these sizes, each with its variance.
 
     Args:
         values: planes, a signal's and its variance each. fading: which signals' taps get weaker
-            by log2 of `fade`. sigmas: sqrt(log2(e)) / sigma of each signal. Others as of
-            `smooth_level`.
+            by the first of `weaker`; the second, if any, is `narrowness` of visibility.
+            sigmas: sqrt(log2(e)) / sigma of each signal. Others as of `smooth_level`.
     """
     exponent = surface_exponent(surfaces, plane, *spacing)
     center, h0 = values.at(-1), BINOMIAL[0]**2
@@ -279,13 +285,17 @@ def guided_level(sizes: tuple[int, ...], fading: tuple[bool, ...], values: Taps,
     scales = [sigma / (dr.sqrt(center[start + size]) + EPSILON)
               for start, size, sigma in zip(starts, sizes, sigmas)]
     totals = [type(plane[0])(h0) for _ in sizes]
+    fade, *narrow = weaker
+    narrow = [x * dr.square(spacing[0]) for x in narrow]
     for i, offset in enumerate(window(1)):
         tap, e = values.at(i), exponent(i, offset)
         for s, (start, size) in enumerate(zip(starts, sizes)):
             at = start + luma(size)
             distance = (tap[at] - center[at]) * scales[s]
             x = dr.fma(distance, -distance, e)
-            w = exp2(x + fade[0] if fading[s] else x)
+            if size == 1 and narrow:
+                x = dr.fma(narrow[0], -float(offset[0]**2 + offset[1]**2), x)
+            w = exp2(x + fade if fading[s] else x)
             totals[s] += w
             for c in range(start, start + size):
                 sums[c] = dr.fma(w, tap[c], sums[c])

@@ -32,6 +32,7 @@ from render.channels import SHADOW
 from render.frame import Frame
 
 from .history import look_up
+from .penumbra import light_sizes, sharpness
 from .reprojection import inverses, locate, world_motions
 from .sparse import weighted_sums
 from .stencil import Float, Stencil
@@ -62,12 +63,13 @@ class ShadowRays:
 
     Attributes:
         hits: light from the surface (3, world axes), its object ID, distance and ID of the blocker.
-        table: of `shadow_table`. matrices: camera_from_world and screen_from_camera, 3x3 each,
-            row by row; number of objects.
+        table: of `shadow_table`. sizes: of `penumbra.light_sizes`. matrices: camera_from_world and
+            screen_from_camera, 3x3 each, row by row; number of objects.
     """
 
     hits: list[Float]
     table: list[Float]
+    sizes: list[Float]
     matrices: list[Float]
 
 
@@ -78,6 +80,7 @@ def read_shadow_rays(frame: Frame, previous: Frame, stencil: Stencil) -> ShadowR
     matrices = [*frame.camera_from_world[:3, :3].ravel(), *screen_from_camera(frame).ravel(),
                 len(frame.world_from_object)]
     return ShadowRays(hits, [stencil.table(shadow_table(previous, frame))],
+                      [stencil.table(light_sizes(frame))],
                       [stencil.opaque(x) for x in matrices])
 
 
@@ -88,16 +91,12 @@ def shadow_motion(stencil: Stencil, hits: list[Float], surface: list[Float], pos
     Args:
         hits, table, matrices: of `ShadowRays`. surface: ID, normal (3), depth. position: X.
     """
-    light, (light_id, distance, blocker_id) = hits[:3], hits[3:]
     rows = [matrices[i:i + 3] for i in range(0, 18, 3)]
-    objects = matrices[18]
-    light = transform(rows[:3], light)
-    length2 = dot(light, light)
+    light, light_id, blocker_id = transform(rows[:3], hits[:3]), hits[3], hits[5]
     id_, *normal, depth = surface
-    blocked = ((id_ >= 0) & (id_ < objects) & (distance > 0) & (length2 > 0) & (blocker_id >= 0)
-               & (blocker_id < objects) & (light_id < objects))
+    objects = matrices[18]
+    blocked, share = stopped(hits, id_, objects)
     light_id = dr.select(light_id >= 0, light_id, objects)
-    share = distance * dr.rsqrt(dr.select(blocked, length2, 1))
     row, column = stencil.pixel()
 
     def follow(_: Any) -> tuple[Float, list[Float]]:
@@ -130,6 +129,26 @@ def shadow_motion(stencil: Stencil, hits: list[Float], surface: list[Float], pos
     return [moves, *du]
 
 
+def follow_shadows(stencil: Stencil, hits: list[Float], surface: list[Float],
+                   position: list[Float], table: list[Float], sizes: list[Float],
+                   matrices: list[Float]) -> list[Float]:
+    """`shadow_motion` (3) and `penumbra.sharpness` (2) of each pixel; arguments as of those."""
+    id_, *_, depth = surface
+    blocked, share = stopped(hits, id_, matrices[18])
+    focal = dr.abs(matrices[9])  # of screen_from_camera
+    return [*shadow_motion(stencil, hits, surface, position, table, matrices),
+            *sharpness(stencil, blocked, share, hits[3], depth, focal, sizes[0])]
+
+
+def stopped(hits: list[Float], id_: Float, objects: Float) -> tuple[Any, Float]:
+    """Whether an object stopped each shadow ray, and at which share of its way."""
+    light, (light_id, distance, blocker_id) = hits[:3], hits[3:]
+    length2 = dot(light, light)
+    blocked = ((id_ >= 0) & (id_ < objects) & (distance > 0) & (length2 > 0) & (blocker_id >= 0)
+               & (blocker_id < objects) & (light_id < objects))
+    return blocked, distance * dr.rsqrt(dr.select(blocked, length2, 1))
+
+
 def _moved(matrix: list[Float], point: list[Float]) -> list[Float]:
     return [dr.fma(matrix[r], point[0], dr.fma(matrix[r + 1], point[1],
             dr.fma(matrix[r + 2], point[2], matrix[r + 3]))) for r in (0, 4, 8)]
@@ -151,7 +170,7 @@ def look_up_shadow(stencil: Stencil, surface: list[Float], guides: list[Float],
     share = shadows[0]
     moves = share > FEWEST
     norm = 1 / dr.select(moves, share, 1)
-    shift = [dr.select(moves, x * norm, 0) for x in shadows[1:]]
+    shift = [dr.select(moves, x * norm, 0) for x in shadows[1:3]]
     inverse_depth = dr.fma(guides[1], shift[0], dr.fma(guides[2], shift[1], guides[0]))
     moves &= inverse_depth > 0
     there = [*surface[:4], dr.select(moves, 1 / inverse_depth, surface[4])]

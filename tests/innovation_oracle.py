@@ -92,12 +92,12 @@ def spread(frame: Frame, energy: np.ndarray, counts: np.ndarray, levels: int, m)
 
 
 def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, sigma: float,
-           fade: np.ndarray, m) -> np.ndarray:
-    """The last filter; its last level's taps are weaker by `fade`."""
+           fade: np.ndarray, narrow: np.ndarray, m) -> np.ndarray:
+    """The last filter; its last level's taps are weaker by `fade`, all by exp(-narrow r^2)."""
     shape = frame["id"].shape
     for i in range(levels):
         weaker = fade if i == levels - 1 else np.ones_like(fade)
-        pixels = pixels_of(frame, x=image, v=variance, fade=weaker)
+        pixels = pixels_of(frame, x=image, v=variance, fade=weaker, narrow=narrow)
         total, squares, weights = np.zeros_like(image), np.zeros(shape), np.zeros(shape)
         for dy in (-1, 0, 1):
             for dx in (-1, 0, 1):
@@ -107,7 +107,8 @@ def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, s
                 w = geometry(p, q, dy, dx, m)
                 if dy or dx:
                     deviations = (lum(q.x) - lum(p.x)) / (np.sqrt(p.v) + 1e-6)
-                    w = w * p.fade * np.exp(-(deviations / sigma) ** 2)
+                    w = w * p.fade * np.exp(-(deviations / sigma) ** 2
+                                            - p.narrow * (dy * dy + dx * dx) * 4**i)
                 total[where] += w[..., None] * q.x
                 squares[where] += w * w * q.v
                 weights[where] += w
@@ -202,6 +203,30 @@ def shadow_history(previous: Frame, frame: Frame, image: np.ndarray, m) -> tuple
     return history, found & near
 
 
+def light_sizes(frame: Frame) -> dict[int, float]:
+    """Twice the deviation of the points that shadow rays were sent to, by light."""
+    there = frame["id"] >= 0
+    points, lights = (frame["position"] + frame["light"])[there], frame["light_id"][there]
+    return {int(i): 2 * np.sqrt(points[lights == i].astype(float).var(0).sum())
+            if (lights == i).sum() > 3 else np.inf for i in np.unique(lights)}
+
+
+def narrowness(frame: Frame, m) -> np.ndarray:
+    """q / (2 p^2) from the widths of the penumbras around, 0 where nothing is in the way."""
+    stopped = (frame["id"] >= 0) & (frame["blocker_distance"] > 0)
+    sizes = light_sizes(frame)
+    size = np.vectorize(lambda i: sizes.get(int(i), np.inf))(frame["light_id"])
+    d = frame["blocker_distance"].astype(float)
+    whole = np.maximum(np.linalg.norm(frame["light"].astype(float), axis=-1), 1e-9)
+    focal = (frame.screen_from_world @ np.linalg.inv(frame.camera_from_world))[0, 0]
+    with np.errstate(invalid="ignore"):
+        width = size * d / (whole - d) * focal / frame["depth"]
+    q = np.where(stopped, 1 / (width**2 + 1), 0)
+    around = smooth(frame, np.stack([stopped, q], -1), np.ones(q.shape), 1, m, first=2)
+    share = around[..., 0]
+    return np.where(share > 1e-3, around[..., 1] / np.maximum(share, 1e-3), 0) / (2 * m.penumbra**2)
+
+
 def run(frames: list[Frame], m) -> np.ndarray:
     """The colour of the last frame."""
     settings = {"L": (m.light_alpha, m.smoothing, m.levels, m.light_sigma),
@@ -250,6 +275,8 @@ def run(frames: list[Frame], m) -> np.ndarray:
             s2 = (1 - a) ** 2 * s2 + a**2 * noise
             kept[name] = history, s2
             fade = np.clip(1 - (n - 1) / m.fade, 0, 1)
-            out[name] = guided(frame, history, s2, levels, sigma, fade, m)
+            narrow = (narrowness(frame, m) if name == "V" and m.follow_shadows
+                      and "light" in frame else np.zeros(fade.shape))
+            out[name] = guided(frame, history, s2, levels, sigma, fade, narrow, m)
         length, previous = n, frame
     return color_of(frames[-1], out)

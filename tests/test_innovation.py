@@ -26,13 +26,16 @@ def run(method, frames):
 
 
 def with_shadow_rays(frame, seed=0, light=(1.0, -3.0, 1.0)):
-    """The frame with shadow rays to a light, of which the board (object 1) stops two in five."""
+    """The frame with shadow rays to two lights of a size, of which the board (object 1) stops two
+    in five."""
     rng = np.random.default_rng(seed)
     there = frame["id"] >= 0
-    toward = np.where(there[..., None], light - frame["position"], 0)
+    lights = rng.choice([-1, 0], there.shape)
+    points = light + rng.normal(0, 0.3, (*there.shape, 3)) * (2 + lights[..., None])
+    toward = np.where(there[..., None], points - frame["position"], 0)
     stopped = there & (rng.random(there.shape) < 0.4)
     distance = np.linalg.norm(toward, axis=-1) * rng.uniform(0.3, 0.6, there.shape)
-    return with_images(frame, light=toward, light_id=np.full(there.shape, -1),
+    return with_images(frame, light=toward, light_id=lights,
                        blocker_distance=np.where(stopped, distance, 0),
                        blocker_id=np.where(stopped, 1, -1))
 
@@ -166,12 +169,12 @@ def test_a_moving_object_and_its_background_keep_histories_of_their_own():
 def test_five_frames_are_one_recording_and_parameters_compile_nothing():
     frames = split(16, 20, 5)
     run(FilteredInnovation(), frames)
-    other = FilteredInnovation(light_alpha=0.1, visibility_sigma=3.0, fade=3.0, sigma_plane=0.02,
-                               longest=9.0, plane_tolerance=0.03)
+    other = FilteredInnovation(light_alpha=0.1, visibility_sigma=3.0, fade=3.0, penumbra=2.0,
+                               sigma_plane=0.02, longest=9.0, plane_tolerance=0.03)
     assert compiled(lambda: run(other, frames)) == 0
     _, state = run(FilteredInnovation(), frames)
     works = state.works
-    steps = [works.shadow_motion, works.look_back, works.merge, works.pack,
+    steps = [works.follow_shadows, works.look_back, works.merge, works.pack,
              *(level.step for level in (*works.around, *works.smoothing, *works.levels))]
     assert [step.recordings for step in steps] == [1] * len(steps)
 
@@ -204,7 +207,7 @@ def test_other_channels_halfway_are_refused():
 @pytest.mark.parametrize("settings", [
     {"levels": 0}, {"levels": 2.0}, {"sharp_levels": 5}, {"sharp_smoothing": 1},
     {"light_alpha": 0.0}, {"visibility_sigma": -1.0}, {"longest": 0.0}, {"follow": 0.0},
-    {"doubt": -1.0}, {"fade": 0.0}, {"sharp_follow": 0.0}, {"renewal": 2.0}])
+    {"doubt": -1.0}, {"penumbra": 0.0}, {"fade": 0.0}, {"sharp_follow": 0.0}, {"renewal": 2.0}])
 def test_bad_parameters_are_refused(settings):
     with pytest.raises(InputError, match=next(iter(settings))):
         FilteredInnovation(**settings)
