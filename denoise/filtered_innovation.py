@@ -70,17 +70,17 @@ class FilteredInnovation(OnLanes):
         min_cosine, plane_tolerance: tests of history, see `reprojection.py`.
         demodulate: filter diffuse light without texture, where frames have albedo.
         gloss: glossy light as a signal of its own, where frames have it.
-        penumbra: reach of visibility's last filter, deviations in widths of the penumbra, where
-            frames say.
+        penumbra: reach of the smoothing of visibility, and of its last filter: a level's deviation
+            in widths of the penumbra.
         follow_shadows: visibility's history where the shadow was, and `penumbra`; where frames
             have shadow rays.
     """
 
     light_alpha: float = 0.05
     visibility_alpha: float = 0.15
-    follow: float = 0.5
+    follow: float = 0.55
     doubt: float = 4.0
-    sharp_follow: float = 0.6
+    sharp_follow: float = 0.75
     renewal: float = 0.6
     smoothing: int = 5
     levels: int = 4
@@ -137,28 +137,28 @@ class FilteredInnovation(OnLanes):
         guides, id_ = [inverse_depth, *plane], stencil.Float(surface.id)
         dr.eval(signal, near, guides, id_, (rays.hits, surface.position) if rays else [])
 
-        limits = [stencil.opaque(x) for x in (self.min_cosine, self.plane_tolerance, self.longest)]
+        limits = [stencil.opaque(x) for x in (
+            self.min_cosine, self.plane_tolerance, self.longest, LOG2E / (2 * self.penumbra**2))]
         works.surfaces.store([inverse_depth, id_])
         shadows = []
         if rays:
             shadows = works.through(works.around, works.follow_shadows(
                 rays.hits, near, surface.position, rays.table, rays.sizes, rays.matrices), plane)
-        innovation, energies, carried, seen, other = works.look_back(
+        innovation, energies, carried, seen, other, narrow = works.look_back(
             signal, near, guides, [table], dual, [state.records], shadows, limits)
         works.surfaces.store(seen)
-        smooth, energies = works.smooth_innovation(innovation, energies, other, plane)
+        smooth, energies = works.smooth_innovation(innovation, energies, other, plane, narrow)
         # Without visibility apart, diffuse light has the shadows in it, which are quick.
         follow = self.follow if signals.unshadowed else 1.0
         numbers = [stencil.opaque(x) for x in (
             follow, self.doubt, self.sharp_follow, self.renewal, self.fade,
-            LOG2E / (2 * self.penumbra**2),
             *_each(works.sizes, self.light_alpha, self.visibility_alpha))]
-        values, weaker = works.merge(signal, innovation, smooth, energies, carried, other,
-                                     guides, shadows[3:], numbers)
+        values, fade = works.merge(signal, innovation, smooth, energies, carried, other,
+                                   guides, numbers)
         sigmas = [stencil.opaque(math.sqrt(LOG2E) / x)
                   for x in _each(works.sizes, self.light_sigma, self.visibility_sigma)]
         works.surfaces.store([inverse_depth])
-        parts = works.filter(values, plane, weaker, sigmas)
+        parts = works.filter(values, plane, [*fade, *narrow], sigmas)
         records = works.pack(near, carried[:1], values)
         return signals.color(parts), replace(state, works=works, records=records,
                                             previous=without_images(frame))
@@ -222,14 +222,17 @@ class Works:
                    (sum(sizes[1:]) + int(shadows) + 1, method.sharp_smoothing),
                    (len(sizes), ENERGY_LEVELS)]
         spreads = 0, 1 + sizes[0] + int(shadows)
+        visibility = spreads[1] + sum(sizes[1:])
+        narrowed = (spreads[1], visibility, visibility + 1) if shadows else ()
         values = stencil.planes([0.0] * sum(planes for planes, _ in leaving))
 
         def smoothing(i: int) -> Level:
             count = sum(planes for planes, levels in leaving if i < levels)
-            return Level.make(i, values, count, surfaces, lambda *a: smooth_level(spreads, *a))
+            return Level.make(i, values, count, surfaces,
+                              lambda *a: smooth_level(spreads, narrowed, *a))
 
         def around(i: int) -> Level:
-            return Level.make(i, values, 5, surfaces, lambda *a: smooth_level((), *a))
+            return Level.make(i, values, 5, surfaces, lambda *a: smooth_level((), (), *a))
 
         def last(i: int) -> Level:
             some = sizes if i < method.sharp_levels else sizes[:1]
@@ -256,13 +259,14 @@ class Works:
             values[:count] = level.step(*level.taps, plane, [level.spacing], *numbers)
         return values
 
-    def smooth_innovation(self, innovation: list[Float], energies: list[Float], other: list[Float],
-                          plane: list[Float]) -> tuple[list[Float], list[Float]]:
+    def smooth_innovation(self, innovation: list[Float], energies: list[Float],
+                          other: list[Float], plane: list[Float],
+                          narrow: list[Float]) -> tuple[list[Float], list[Float]]:
         """Q, S of the innovation and of the other one, as `merge` wants them; W of its energies."""
         parts = ([energies[0]], innovation[:self.sizes[0]], other[2:], [energies[-1]],
                  innovation[self.sizes[0]:], other[:1], energies)
         values, smooth = [x for part in parts for x in part], []
-        values = self.through(self.smoothing, values, plane)
+        values = self.through(self.smoothing, values, plane, narrow)
         for part in parts:
             smooth.append(values[:len(part)])
             values = values[len(part):]

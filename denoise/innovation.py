@@ -33,8 +33,8 @@ of h compares luminance too,
 
     w = h exp(-distance(q, p's plane) / (sigma_plane z(p)) - ((l(p) - l(q)) / (sigma s))^2)
 
-and its last level fades out as the history grows. Visibility is filtered no farther than shadows
-are soft: `penumbra.py`. A pixel of another object counts for two fifths.
+and its last level fades out as the history grows. A pixel of another object counts for two fifths.
+Visibility is filtered no farther than shadows are soft, and so are its e and Q: `penumbra.py`.
 Normals are not compared: where they differ much the tangent plane is soon left, and at a crease, or
 on a leaf, a neighbour turned away is a better guess than one sample (+0.2 to 0.9 dB for
 normal_power 0 instead of 4 and 128).
@@ -46,7 +46,7 @@ the gradients of A-SVGF (Schied et al. 2018).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from itertools import product
 from typing import Any
 
@@ -85,14 +85,14 @@ def look_back(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], sur
     Args:
         signal: planes of all signals. surface: ID, normal (3), depth. guides: 1/z, its slopes (2)
             and scale. motion, dual: of `motion_between`. records: of `pack_history`.
-            shadows: of `shadow_motion`, smoothed, or empty. numbers: min_cosine,
-            plane_tolerance, longest.
+            shadows: of `follow_shadows`, smoothed, or empty. numbers: min_cosine,
+            plane_tolerance, longest, scale of `narrowness`.
     Returns:
         e, 0 without history; l(e)^2 a signal; n, then s^2 of each signal's history; 1/z, far away
         without history; and, with `shadows`, e and s^2 of visibility's other history, and how much
-        greater its e^2 is.
+        greater its e^2 is; and `narrowness`.
     """
-    min_cosine, tolerance, longest = numbers
+    min_cosine, tolerance, longest, scale = numbers
     place = locate(stencil, surface, motion[0], dual, tolerance)
     count, last = 1 + len(signal) + len(sizes), sizes[-1] + 1
     words, found = look_up(stencil, place, records[0], count, min_cosine)
@@ -113,7 +113,8 @@ def look_back(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], sur
         moves &= found
         e = dr.select(moves, signal[-1] - v, innovation[-1])
         other = [e, dr.select(moves, variance, variances[-1]), dr.square(e) - energies[-1]]
-    return innovation, energies, [length, *variances], seen, other
+    narrow = [narrowness(shadows[3:], scale, FEWEST)] if shadows else []
+    return innovation, energies, [length, *variances], seen, other, narrow
 
 
 def pack_history(stencil: Stencil, sizes: tuple[int, ...], surface: list[Float],
@@ -126,29 +127,37 @@ def pack_history(stencil: Stencil, sizes: tuple[int, ...], surface: list[Float],
     return pack_records(stencil, surface, [*values[-last:], *length, *values[:-last]])
 
 
-def smooth_level(spreads: Collection[int], values: Taps, surfaces: Taps, plane: list[Float],
-                 spacing: list[Float]) -> list[Float]:
+def smooth_level(spreads: Collection[int], narrowed: Collection[int], values: Taps,
+                 surfaces: Taps, plane: list[Float], spacing: list[Float],
+                 narrow: Sequence[Float] = ()) -> list[Float]:
     """One level of S, and of Q. The last tap is the pixel itself.
 
     Args:
-        spreads: indices of what Q is of. values: what Q and S are of.
+        spreads: indices of what Q is of. narrowed: of what is smoothed no farther than shadows
+            are soft, if `narrow` says so. values: what Q and S are of.
         surfaces: 1/z, far away where a pixel has no history, so that it does not count; ID.
         plane: slope of 1/z by column and row, scale of a difference of 1/z.
-        spacing: pixels between taps.
+        spacing: pixels between taps. narrow: `narrowness`, or empty.
     """
     exponent = surface_exponent(surfaces, plane, *spacing)
     h0 = BINOMIAL[0]**2
-    total = type(plane[0])(h0)
+    limits = [x * dr.square(spacing[0]) for x in narrow]
+    groups = [int(c in narrowed and bool(limits)) for c in range(len(values.at(-1)))]
+    totals = [type(plane[0])(h0) for _ in range(2)]
     sums = [v * (h0**2 if c in spreads else h0) for c, v in enumerate(values.at(-1))]
     for i, offset in enumerate(window(1)):
-        w = exp2(exponent(i, offset))
-        w2 = w * w
-        sums = [dr.fma(w2 if c in spreads else w, v, s)
+        x = exponent(i, offset)
+        weights = [exp2(x)]
+        if 1 in groups:
+            weights.append(exp2(dr.fma(limits[0], -float(offset[0]**2 + offset[1]**2), x)))
+        squares = [dr.square(w) for w in weights]
+        sums = [dr.fma((squares if c in spreads else weights)[groups[c]], v, s)
                 for c, (v, s) in enumerate(zip(values.at(i), sums))]
-        total += w
+        totals = [t + w for t, w in zip(totals, weights)]
         values.next()
-    norm = 1 / total
-    return [s * (dr.square(norm) if c in spreads else norm) for c, s in enumerate(sums)]
+    norms = [1 / total for total in totals]
+    return [s * (dr.square(norms[g]) if c in spreads else norms[g])
+            for c, (s, g) in enumerate(zip(sums, groups))]
 
 
 def surface_exponent(surfaces: Taps, plane: list[Float],
@@ -171,18 +180,15 @@ def surface_exponent(surfaces: Taps, plane: list[Float],
 
 def merge(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], innovation: list[Float],
           smooth: list[Float], energies: list[Float], carried: list[Float], other: list[Float],
-          guides: list[Float], penumbras: list[Float],
-          numbers: list[Float]) -> tuple[list[Float], list[Float]]:
-    """The new history, a signal's planes and its s^2 each; and what makes the last filter weaker:
-    log2 of its fading, and `narrowness` if there are shadow rays.
+          guides: list[Float], numbers: list[Float]) -> tuple[list[Float], list[Float]]:
+    """The new history, a signal's planes and its s^2 each; and how the last filter fades out.
 
     Args:
         smooth: Q of the first and the last signal, S[e], and S of what is in `other`: how much
             greater e^2 is, and e.
         energies: W[l(e)^2]. carried, other: as from `look_back`.
-        guides: 1/z, its slopes (2) and scale, of all pixels. penumbras: `sharpness`, smoothed, or
-            empty. numbers: g, k, g', r, frames until the filter has faded, scale of `narrowness`,
-            and each signal's alpha.
+        guides: 1/z, its slopes (2) and scale, of all pixels. numbers: g, k, g', r,
+            frames until the filter has faded, and each signal's alpha.
     """
     length, *variances = carried
     spread, last_spread, *smooth = smooth
@@ -193,7 +199,7 @@ def merge(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], innovat
         smooth[-1] = dr.select(better, wide_other, smooth[-1])
         variances[-1] = dr.select(better, other[1], variances[-1])
         energies = [*energies[:-1], dr.maximum(energies[-1] + dr.minimum(excess, 0), 0)]
-    least, doubt, sharp, renewal, frames, scale, *alphas = numbers
+    least, doubt, sharp, renewal, frames, *alphas = numbers
     new = length < 1.5
     first = spatial_variances(stencil, sizes, signal, new, guides)
     values, at = [], 0
@@ -213,8 +219,7 @@ def merge(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], innovat
                                                     energies[s] * LEAST_NOISE))
         values.append(dr.fma(dr.square(1 - a), variances[s], dr.square(a) * noise))
         at += size
-    narrow = [narrowness(penumbras, scale, FEWEST)] if penumbras else []
-    return values, [_fade_out(length, frames), *narrow]
+    return values, [_fade_out(length, frames)]
 
 
 def _certainty(spread: Float, wide: Float, doubt: Float) -> Float:

@@ -6,7 +6,7 @@ Past an edge that is d away from a surface, a light of size s, D away, throws a 
 
 in pixels times f / z, f being the pixels of a unit length at depth 1. Each shadow ray that was
 stopped tells d and D; s is how far the points lie apart that the frame's shadow rays asked a light
-for. The last filter of `innovation.py` weighs a tap of visibility, r pixels away, also by
+for. A level of `innovation.py` weighs a tap of visibility, r pixels away, also by
 
     exp(-r^2 q / (2 p^2)),
 
@@ -29,7 +29,7 @@ from render.frame import Frame
 from .stencil import Float, Stencil
 from .surface import camera_from_screen
 
-_SAMPLES = 4096   # pixels that sizes of lights are estimated from
+_SAMPLES = 2048   # pixels that sizes of lights are estimated from
 _FEWEST = 4       # points of a light, or its size is not known
 _FARTHEST = 1e15  # of a point of a light that counts
 
@@ -41,8 +41,9 @@ def light_sizes(frame: Frame) -> np.ndarray:
     step = max(1, round((frame.height * frame.width / _SAMPLES) ** 0.5))
     some = slice(step // 2, None, step)
     depth, light, id_ = (frame[name][some, some] for name in ("depth", "light", "light_id"))
-    y, x = np.mgrid[some.start:frame.height:step, some.start:frame.width:step] + 0.5
-    ray = np.stack([x, y, np.ones(x.shape)], -1) @ camera_from_screen(frame).T
+    b = camera_from_screen(frame)
+    y, x = (np.arange(some.start, size, step)[:, None] + 0.5 for size in frame["id"].shape)
+    ray = (y * b[:, 1])[:, None] + x * b[:, 0] + b[:, 2]
     with np.errstate(invalid="ignore", over="ignore"):
         point = depth[..., None] * ray + light @ frame.camera_from_world[:3, :3].T
         good = ((frame["id"][some, some] >= 0) & (np.abs(light).sum(-1) > 0)

@@ -54,11 +54,11 @@ def pixels_of(frame: Frame, **more: np.ndarray) -> Pixels:
 
 
 def smooth(frame: Frame, image: np.ndarray, counts: np.ndarray, levels: int, m,
-           first: int = 0) -> np.ndarray:
-    """S: levels over the pixels that count."""
+           first: int = 0, narrow: np.ndarray | float = 0.0) -> np.ndarray:
+    """S: levels over the pixels that count, taps weaker by exp(-narrow r^2)."""
     shape = frame["id"].shape
     for i in range(first, first + levels):
-        pixels = pixels_of(frame, x=image, counts=counts)
+        pixels = pixels_of(frame, x=image, counts=counts, narrow=narrow * np.ones(shape))
         total = np.zeros_like(image)
         weights = np.zeros((*shape, 1))
         for dy in (-1, 0, 1):
@@ -67,17 +67,19 @@ def smooth(frame: Frame, image: np.ndarray, counts: np.ndarray, levels: int, m,
                 if where is None:
                     continue
                 w = (geometry(p, q, dy, dx, m) * (q.counts if dy or dx else 1))[..., None]
+                w = w * np.exp(-p.narrow * (dy * dy + dx * dx) * 4**i)[..., None]
                 total[where] += w * q.x
                 weights[where] += w
         image = total / weights
     return image
 
 
-def spread(frame: Frame, energy: np.ndarray, counts: np.ndarray, levels: int, m) -> np.ndarray:
+def spread(frame: Frame, energy: np.ndarray, counts: np.ndarray, levels: int, m,
+           narrow: np.ndarray) -> np.ndarray:
     """Q: the variance of a smoothing whose pixels have these."""
     shape = frame["id"].shape
     for i in range(levels):
-        pixels = pixels_of(frame, x=energy, counts=counts)
+        pixels = pixels_of(frame, x=energy, counts=counts, narrow=narrow)
         total, weights = np.zeros(shape), np.zeros(shape)
         for dy in (-1, 0, 1):
             for dx in (-1, 0, 1):
@@ -85,6 +87,7 @@ def spread(frame: Frame, energy: np.ndarray, counts: np.ndarray, levels: int, m)
                 if where is None:
                     continue
                 w = geometry(p, q, dy, dx, m) * (q.counts if dy or dx else 1)
+                w = w * np.exp(-p.narrow * (dy * dy + dx * dx) * 4**i)
                 total[where] += w**2 * q.x
                 weights[where] += w
         energy = total / weights**2
@@ -252,8 +255,11 @@ def run(frames: list[Frame], m) -> np.ndarray:
                 e, s2 = np.where(found[..., None], d - both[..., :-1], 0), both[..., -1]
                 energy = smooth(frame, lum(e)[..., None] ** 2, found, 2, m)[..., 0]
                 noise = np.where(found, np.maximum(energy - s2, energy / 4), noise)
-            a, q = np.maximum(1 / n, alpha), spread(frame, lum(e) ** 2, found, smoothing, m)
-            wide, follow = smooth(frame, e, found, smoothing, m), np.maximum(m.sharp_follow, a)
+            narrow = (narrowness(frame, m) if name == "V" and m.follow_shadows
+                      and "light" in frame else np.zeros(found.shape))
+            a, q = np.maximum(1 / n, alpha), spread(frame, lum(e) ** 2, found, smoothing, m, narrow)
+            wide = smooth(frame, e, found, smoothing, m, narrow=narrow)
+            follow = np.maximum(m.sharp_follow, a)
             if name == "V" and previous is not None and m.follow_shadows and "light" in frame:
                 both = np.concatenate([kept[name][0], kept[name][1][..., None]], -1)
                 both, moves = shadow_history(previous, frame, both, m)
@@ -262,7 +268,8 @@ def run(frames: list[Frame], m) -> np.ndarray:
                 levels_ = min(max(5, m.sharp_smoothing), m.smoothing)
                 excess = smooth(frame, other**2 - e**2, found, levels_, m)
                 better = excess[..., 0] < 0
-                wide = np.where(excess < 0, smooth(frame, other, found, smoothing, m), wide)
+                wide = np.where(excess < 0, smooth(frame, other, found, smoothing, m,
+                                                   narrow=narrow), wide)
                 e, s2 = np.where(excess < 0, other, e), np.where(better & moves, both[..., -1], s2)
                 energy = np.maximum(energy + np.minimum(excess[..., 0], 0), 0)
                 noise = np.where(found, np.maximum(energy - s2, energy / 4), noise)
@@ -275,8 +282,6 @@ def run(frames: list[Frame], m) -> np.ndarray:
             s2 = (1 - a) ** 2 * s2 + a**2 * noise
             kept[name] = history, s2
             fade = np.clip(1 - (n - 1) / m.fade, 0, 1)
-            narrow = (narrowness(frame, m) if name == "V" and m.follow_shadows
-                      and "light" in frame else np.zeros(fade.shape))
             out[name] = guided(frame, history, s2, levels, sigma, fade, narrow, m)
         length, previous = n, frame
     return color_of(frames[-1], out)
