@@ -2,11 +2,12 @@
 
 Past an edge that is d away from a surface, a light of size s, D away, throws a penumbra of width
 
-    w = s d / (D - d),
+    w = s d / ((D - d) cos),
 
-in pixels times f / z, f being the pixels of a unit length at depth 1. Each shadow ray that was
-stopped tells d and D; s is how far the points lie apart that the frame's shadow rays asked a light
-for. A level of `innovation.py` weighs a tap of visibility, r pixels away, also by
+cos being of the angle at which the light meets the surface: where it grazes, a penumbra is long. On
+the screen that is w f / z pixels, f being the pixels of a unit length at depth 1. Each shadow ray
+that was stopped tells d and D; s is how far the points lie apart that the frame's shadow rays asked
+a light for. A level of `innovation.py` weighs a tap of visibility, r pixels away, also by
 
     exp(-r^2 q / (2 p^2)),
 
@@ -59,18 +60,19 @@ def light_sizes(frame: Frame) -> np.ndarray:
     return np.where(number < _FEWEST, np.inf, size).astype(np.float32)
 
 
-def sharpness(stencil: Stencil, blocked: Float, share: Float, light_id: Float, depth: Float,
-              focal: Float, sizes: Float) -> list[Float]:
+def sharpness(stencil: Stencil, blocked: Float, share: Float, cosine: Float, light_id: Float,
+              depth: Float, focal: Float, sizes: Float) -> list[Float]:
     """Whether each pixel's shadow ray was stopped, 1 or 0, and q where it was.
 
     Args:
-        blocked, share: of `shadow_motion.stopped`. light_id: what the ray was sent to.
+        blocked, share: of `shadow_motion.stopped`. cosine: between the ray and the normal.
+        light_id: what the ray was sent to.
         focal: f. sizes: of `light_sizes`.
     """
     nobody = float(dr.width(sizes) - 1)
     size = dr.gather(stencil.Float, sizes, stencil.UInt(
         dr.select(blocked, dr.select(light_id >= 0, light_id, nobody), 0)))
-    left = dr.square(1 - share)
+    left = dr.square((1 - share) * cosine)
     q = left / dr.maximum(dr.square(size * share * focal / depth) + left, 1e-20)
     return [dr.select(blocked, stencil.Float(1), 0), dr.select(blocked & (q > 0), q, 0)]
 

@@ -133,11 +133,14 @@ def follow_shadows(stencil: Stencil, hits: list[Float], surface: list[Float],
                    position: list[Float], table: list[Float], sizes: list[Float],
                    matrices: list[Float]) -> list[Float]:
     """`shadow_motion` (3) and `penumbra.sharpness` (2) of each pixel; arguments as of those."""
-    id_, *_, depth = surface
+    id_, *normal, depth = surface
     blocked, share = stopped(hits, id_, matrices[18])
+    light = transform([matrices[i:i + 3] for i in (0, 3, 6)], hits[:3])
+    length2 = dot(light, light)
+    cosine = dr.abs(dot(normal, light)) * dr.rsqrt(dr.select(blocked, length2, 1))
     focal = dr.abs(matrices[9])  # of screen_from_camera
     return [*shadow_motion(stencil, hits, surface, position, table, matrices),
-            *sharpness(stencil, blocked, share, hits[3], depth, focal, sizes[0])]
+            *sharpness(stencil, blocked, share, cosine, hits[3], depth, focal, sizes[0])]
 
 
 def stopped(hits: list[Float], id_: Float, objects: Float) -> tuple[Any, Float]:

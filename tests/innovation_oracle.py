@@ -222,8 +222,9 @@ def narrowness(frame: Frame, m) -> np.ndarray:
     d = frame["blocker_distance"].astype(float)
     whole = np.maximum(np.linalg.norm(frame["light"].astype(float), axis=-1), 1e-9)
     focal = (frame.screen_from_world @ np.linalg.inv(frame.camera_from_world))[0, 0]
-    with np.errstate(invalid="ignore"):
-        width = size * d / (whole - d) * focal / frame["depth"]
+    cosine = np.abs((frame["normal"] * frame["light"]).sum(-1, dtype=float)) / whole
+    with np.errstate(invalid="ignore", divide="ignore"):
+        width = size * d / ((whole - d) * cosine) * focal / frame["depth"]
     q = np.where(stopped, 1 / (width**2 + 1), 0)
     around = smooth(frame, np.stack([stopped, q], -1), np.ones(q.shape), 1, m, first=2)
     share = around[..., 0]

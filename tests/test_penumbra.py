@@ -65,7 +65,9 @@ def test_a_penumbra_is_as_wide_as_similar_triangles_say():
     np.testing.assert_array_equal(blocked[here], True)
     assert not blocked[frame["blocker_id"] < 0].any()
     assert not q[~blocked].any()
-    width = light_sizes(frame)[2] * EDGE / (LIGHT - EDGE)
+    toward = frame["light"][here]
+    cosine = toward[:, 1] / np.linalg.norm(toward, axis=1)
+    width = light_sizes(frame)[2] * EDGE / (LIGHT - EDGE) / cosine
     focal = (frame.screen_from_world @ np.linalg.inv(frame.camera_from_world))[0, 0]
     pixels = np.sqrt(1 / q[here] - 1)
     np.testing.assert_allclose(pixels, width * abs(focal) / frame["depth"][here], rtol=5e-3)
