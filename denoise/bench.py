@@ -58,7 +58,7 @@ def _accumulated(previous: Frame, frame: Frame, old: np.ndarray, new: np.ndarray
 
 
 _ATROUS = (5 * (24 * _ATROUS_TAP + 17) + 48 * 12, 4 * (5 * 27 + 38))
-_TEMPORAL = (1150, 4 * 39)
+_TEMPORAL = (660, 4 * 51)
 
 KERNELS = {
     "bilateral": Kernel(33 * 33 * _BILATERAL_TAP, 4 * 33 * 29,

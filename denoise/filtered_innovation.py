@@ -284,4 +284,3 @@ class Works:
 def _each(sizes: tuple[int, ...], light: Any, visibility: Any) -> list[Any]:
     """A parameter of each signal, light or visibility."""
     return [light if size == 3 else visibility for size in sizes]
-

@@ -139,25 +139,39 @@ def smooth_level(spreads: Collection[int], narrowed: Collection[int], values: Ta
         plane: slope of 1/z by column and row, scale of a difference of 1/z.
         spacing: pixels between taps. narrow: `narrowness`, or empty.
     """
-    exponent = surface_exponent(surfaces, plane, *spacing)
+    exponent, near = surface_exponent(surfaces, plane, *spacing), narrowing(narrow, *spacing)
     h0 = BINOMIAL[0]**2
-    limits = [x * dr.square(spacing[0]) for x in narrow]
-    groups = [int(c in narrowed and bool(limits)) for c in range(len(values.at(-1)))]
-    totals = [type(plane[0])(h0) for _ in range(2)]
-    sums = [v * (h0**2 if c in spreads else h0) for c, v in enumerate(values.at(-1))]
+
+    def each(factors: Sequence[Any], terms: Sequence[Any]) -> list[Any]:
+        """(factor, term) of each plane; factors: of the plane ones, and of those narrowed."""
+        kinds = [factors[c in narrowed] for c in range(len(terms))]
+        return [(dr.square(f) if c in spreads else f, t)
+                for c, (f, t) in enumerate(zip(kinds, terms))]
+
+    totals = [type(plane[0])(h0)] * 2
+    sums = [f * v for f, v in each((h0, h0), values.at(-1))]
     for i, offset in enumerate(window(1)):
         x = exponent(i, offset)
-        weights = [exp2(x)]
-        if 1 in groups:
-            weights.append(exp2(dr.fma(limits[0], -float(offset[0]**2 + offset[1]**2), x)))
-        squares = [dr.square(w) for w in weights]
-        sums = [dr.fma((squares if c in spreads else weights)[groups[c]], v, s)
-                for c, (v, s) in enumerate(zip(values.at(i), sums))]
+        weights = exp2(x), exp2(near(x, offset))
+        sums = [dr.fma(w, v, s) for (w, v), s in zip(each(weights, values.at(i)), sums)]
         totals = [t + w for t, w in zip(totals, weights)]
         values.next()
-    norms = [1 / total for total in totals]
-    return [s * (dr.square(norms[g]) if c in spreads else norms[g])
-            for c, (s, g) in enumerate(zip(sums, groups))]
+    return [f * s for f, s in each([1 / total for total in totals], sums)]
+
+
+def narrowing(narrow: Sequence[Float], spacing: Float) -> Callable[[Float, Offset], Float]:
+    """Function of (x, offset): log2 x of a weight, less the more the farther a tap is.
+
+    narrow: `narrowness`, or empty, which takes nothing off.
+    """
+    limits = [x * dr.square(spacing) for x in narrow]
+
+    def limited(x: Float, offset: Offset) -> Float:
+        for limit in limits:
+            x = dr.fma(limit, -float(offset[0]**2 + offset[1]**2), x)
+        return x
+
+    return limited
 
 
 def surface_exponent(surfaces: Taps, plane: list[Float],
@@ -291,15 +305,15 @@ def guided_level(sizes: tuple[int, ...], fading: tuple[bool, ...], values: Taps,
               for start, size, sigma in zip(starts, sizes, sigmas)]
     totals = [type(plane[0])(h0) for _ in sizes]
     fade, *narrow = weaker
-    narrow = [x * dr.square(spacing[0]) for x in narrow]
+    near = narrowing(narrow, *spacing)
     for i, offset in enumerate(window(1)):
         tap, e = values.at(i), exponent(i, offset)
         for s, (start, size) in enumerate(zip(starts, sizes)):
             at = start + luma(size)
             distance = (tap[at] - center[at]) * scales[s]
             x = dr.fma(distance, -distance, e)
-            if size == 1 and narrow:
-                x = dr.fma(narrow[0], -float(offset[0]**2 + offset[1]**2), x)
+            if size == 1:
+                x = near(x, offset)
             w = exp2(x + fade if fading[s] else x)
             totals[s] += w
             for c in range(start, start + size):

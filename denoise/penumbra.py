@@ -65,9 +65,8 @@ def sharpness(stencil: Stencil, blocked: Float, share: Float, cosine: Float, lig
     """Whether each pixel's shadow ray was stopped, 1 or 0, and q where it was.
 
     Args:
-        blocked, share: of `shadow_motion.stopped`. cosine: between the ray and the normal.
-        light_id: what the ray was sent to.
-        focal: f. sizes: of `light_sizes`.
+        blocked: of `shadow_motion.stopped`. share: d / D. cosine: between the ray and the normal.
+        light_id: what the ray was sent to. focal: f. sizes: of `light_sizes`.
     """
     nobody = float(dr.width(sizes) - 1)
     size = dr.gather(stencil.Float, sizes, stencil.UInt(

@@ -11,9 +11,8 @@ same shadow fell where their line meets the tangent plane:
 
 There visibility has another history. A pixel takes the mean of u' - u over a few pixels around it
 whose shadow moves (one level of the smoothing of `innovation.py`), for one sample that is lit tells
-nothing. Which history is the
-right one is not known beforehand (shadows of several objects cross, or one turns): it is the one
-whose squared innovation, smoothed, is smaller.
+nothing. Which history is the right one is not known beforehand (shadows of several objects cross,
+or one turns): it is the one whose squared innovation, smoothed, is smaller.
 
 Source: Zeng et al. 2021, "Temporally Reliable Motion Vectors for Real-time Ray Tracing", section
 4.1. It leaves lit pixels where the surface was, and clamps the history to the neighbours' colours
@@ -92,10 +91,12 @@ def shadow_motion(stencil: Stencil, hits: list[Float], surface: list[Float], pos
         hits, table, matrices: of `ShadowRays`. surface: ID, normal (3), depth. position: X.
     """
     rows = [matrices[i:i + 3] for i in range(0, 18, 3)]
-    light, light_id, blocker_id = transform(rows[:3], hits[:3]), hits[3], hits[5]
+    light_id, distance, blocker_id = hits[3:]
+    light = transform(rows[:3], hits[:3])
     id_, *normal, depth = surface
     objects = matrices[18]
-    blocked, share = stopped(hits, id_, objects)
+    blocked, scale = stopped(hits, id_, objects)
+    share = distance * scale
     light_id = dr.select(light_id >= 0, light_id, objects)
     row, column = stencil.pixel()
 
@@ -134,22 +135,21 @@ def follow_shadows(stencil: Stencil, hits: list[Float], surface: list[Float],
                    matrices: list[Float]) -> list[Float]:
     """`shadow_motion` (3) and `penumbra.sharpness` (2) of each pixel; arguments as of those."""
     id_, *normal, depth = surface
-    blocked, share = stopped(hits, id_, matrices[18])
+    blocked, scale = stopped(hits, id_, matrices[18])
     light = transform([matrices[i:i + 3] for i in (0, 3, 6)], hits[:3])
-    length2 = dot(light, light)
-    cosine = dr.abs(dot(normal, light)) * dr.rsqrt(dr.select(blocked, length2, 1))
+    cosine = dr.abs(dot(normal, light)) * scale
     focal = dr.abs(matrices[9])  # of screen_from_camera
     return [*shadow_motion(stencil, hits, surface, position, table, matrices),
-            *sharpness(stencil, blocked, share, cosine, hits[3], depth, focal, sizes[0])]
+            *sharpness(stencil, blocked, hits[4] * scale, cosine, hits[3], depth, focal, sizes[0])]
 
 
 def stopped(hits: list[Float], id_: Float, objects: Float) -> tuple[Any, Float]:
-    """Whether an object stopped each shadow ray, and at which share of its way."""
+    """Whether an object stopped each shadow ray, and 1 over the whole ray's length."""
     light, (light_id, distance, blocker_id) = hits[:3], hits[3:]
     length2 = dot(light, light)
     blocked = ((id_ >= 0) & (id_ < objects) & (distance > 0) & (length2 > 0) & (blocker_id >= 0)
                & (blocker_id < objects) & (light_id < objects))
-    return blocked, distance * dr.rsqrt(dr.select(blocked, length2, 1))
+    return blocked, dr.rsqrt(dr.select(blocked, length2, 1))
 
 
 def _moved(matrix: list[Float], point: list[Float]) -> list[Float]:

@@ -165,11 +165,15 @@ class Stencil:
         2 margin + 1 rows around each pixel: taps without a copy."""
         starts = [row * self.stride for row in range(2 * margin + 1)]
         if self.layout == "gather":
-            return Taps([], list(arrays), [dr.opaque(self.UInt, start) for start in starts],
-                        self.lanes, self.backend)
+            return self.gathers(arrays, starts, self.lanes)
         memory = [array.numpy() for array in arrays]
         return Taps([[self.Float(m[start:start + self.lanes]) for m in memory] for start in starts],
                     [], [], self.lanes, self.backend)
+
+    def gathers(self, arrays: Sequence[Float], starts: Sequence[int], lanes: int) -> Taps:
+        """Taps of the `gather` layout: arrays from each start on."""
+        return Taps([], list(arrays), [dr.opaque(self.UInt, start) for start in starts], lanes,
+                    self.backend)
 
     def constant(self, value: float) -> Float:
         """An array of lanes that holds one number."""
@@ -199,7 +203,7 @@ class Planes:
     """A few channels of one grid in persistent, padded memory."""
 
     def __init__(self, stencil: Stencil, outside: tuple[float, ...], aligned: bool) -> None:
-        self.stencil = stencil
+        self.stencil, self._count = stencil, len(outside)
         self._views: dict[tuple[int, int, int], Float] = {}
         self._memory, self._targets, self._arrays = [], [], []
         for value in outside:
@@ -244,11 +248,9 @@ class Planes:
             raise ValueError(f"a tap lies farther than the stencil's reach of {s.reach} pixels")
         starts = [s.top + (dy - margin) * s.stride + dx for dy, dx in offsets]
         lanes = s.lanes + 2 * margin * s.stride
+        channels = range(self._count) if channels is None else channels
         if s.layout == "gather":
-            arrays = self._arrays if channels is None else [self._arrays[c] for c in channels]
-            return Taps([], arrays, [dr.opaque(s.UInt, start) for start in starts], lanes,
-                        s.backend)
-        channels = range(len(self._memory)) if channels is None else channels
+            return s.gathers([self._arrays[c] for c in channels], starts, lanes)
         return Taps([[self._view(c, start, lanes) for c in channels] for start in starts], [], [],
                     lanes, s.backend)
 

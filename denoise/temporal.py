@@ -8,7 +8,6 @@ there is no history.
 
 The window mixes objects, as the assignment has it: with k = 1, a pixel at a corner of one colour
 among another has its history pulled towards the other. A wider box trades that for lag.
-
 """
 
 from __future__ import annotations

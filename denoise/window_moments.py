@@ -29,11 +29,7 @@ class RowMoments:
     def make(stencil: Stencil, radius: int) -> RowMoments:
         planes = stencil.planes([0.0] * 3)
         taps = planes.taps([(0, dx) for dx in range(-radius, radius + 1)], margin=radius)
-
-        def of_row(taps: Taps) -> list[Float]:
-            return row_moments(stencil, taps)
-
-        return RowMoments(planes, taps, Step(of_row))
+        return RowMoments(planes, taps, Step(lambda taps: row_moments(stencil, taps)))
 
     def __call__(self, color: list[Float]) -> list[Float]:
         """`row_moments` of an evaluated colour, over `radius` rows more on either side."""
