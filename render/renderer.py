@@ -62,8 +62,13 @@ class Renderer:
     @property
     def channels(self) -> tuple[str, ...]:
         """All channels of its frames that are not the same in any scene of this kind."""
-        return (FRAME + (SPLIT + SHADOW if self.direct == "resampled" else ())
+        return (FRAME + (SPLIT + SHADOW if self._splits else ())
                 + (GLOSS if self.stage.glossy else ()))
+
+    @property
+    def _splits(self) -> bool:
+        """Whether direct light is split: paths of one segment have none."""
+        return self.direct == "resampled" and self.scene.max_depth > 1
 
     def frame(self, index: int, seed: int = 0, channels: Sequence[str] = FRAME,
               previous: int | None = None) -> Frame:
@@ -72,8 +77,9 @@ class Renderer:
         The result depends on (scene, index, seed, size) alone, and the channels of `gradient.py`
         on `previous`, the frame before it (None: there is none).
         """
-        if self.direct != "resampled" and set(channels) & {*SPLIT, *SHADOW}:
-            raise InputError(f"the channels {', '.join(SPLIT + SHADOW)} need --direct resampled")
+        if not self._splits and set(channels) & {*SPLIT, *SHADOW}:
+            raise InputError(f"the channels {', '.join(SPLIT + SHADOW)} need --direct resampled "
+                             "and a scene of max_depth 2 or more")
         replayed = replay(self, index, previous, seed) if set(channels) & set(REPLAY) else {}
         self.stage.pose(index)
         planes = self._trace_frame(index, seed, [c for c in channels if c not in REPLAY])

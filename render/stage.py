@@ -2,6 +2,7 @@
 
 Traps that this file exists for:
 - `load_dict` reorders and merges shapes unless `parallel` and `optimize` are off;
+- a shape's name may hold a dot (`Cube.001`), which Mitsuba's names may not, hence `_ids`;
 - a shape's index in the JIT registry is not its index in the scene, hence `id_from_registry`;
 - Mitsuba computes in float32, so everything is placed relative to `origin` (where the camera is
   at frame 0): a scene far from the world's origin renders as well as one at it;
@@ -12,7 +13,6 @@ Traps that this file exists for:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, cast
 
 import drjit as dr
@@ -20,6 +20,7 @@ import numpy as np
 
 from scenes.description import Cylinder, Disk, Mesh, Rectangle, Scene, SceneError, Shape, Sphere
 
+from . import plugins
 from .variant import mi
 
 _SMALL = 0.125   # a scene that reaches less far has a unit of its own
@@ -46,11 +47,13 @@ class Stage:
         self.frame = frame
         self._mirrored = {shape.name: _mirrors(shape.world_from_object_at(frame))
                           for shape in description.shapes}
+        self._ids = {name: f"shape_{i:06d}" for i, name in enumerate(description.object_names)}
         scene: dict[str, Any] = {"type": "scene"}
         for shape in description.shapes:
-            scene[shape.name] = self._load_shape(shape, frame)
+            scene[self._ids[shape.name]] = self._load_shape(shape, frame)
         if description.environment is not None:
-            scene["environment"] = _environment(description.environment)
+            scene["environment"] = plugins.environment(
+                description.environment, f"the environment of scene '{description.name}'")
         self.mi_scene = mi.load_dict(scene, parallel=False, optimize=False)
         self._parameters = mi.traverse(self.mi_scene)
         self.id_from_registry = self._registry_table()
@@ -66,7 +69,7 @@ class Stage:
             if shape.moves:
                 self._place(shape, shape.world_from_object_at(frame))
             if callable(shape.emission):
-                key = f"{shape.name}.emitter.radiance.value"
+                key = f"{self._ids[shape.name]}.emitter.radiance.value"
                 self._parameters[key] = mi.Color3f(shape.emission_at(frame))
         self._parameters.update()
         self.frame = frame
@@ -125,9 +128,10 @@ class Stage:
 
     def _load_shape(self, shape: Shape, frame: float) -> Any:
         emission = shape.emission_at(frame)
-        parts = {"bsdf": _plugin(shape.material)}
+        parts = {"bsdf": plugins.bsdf(shape.material, f"the material of shape '{shape.name}'")}
         if emission is not None:
-            parts["emitter"] = {"type": "area", "radiance": _rgb(emission)}
+            parts["emitter"] = plugins.area_light(
+                emission, f"the emission of shape '{shape.name}'", isinstance(shape.geometry, Mesh))
         local = self._local(shape.world_from_object_at(frame))
         if isinstance(shape.geometry, Mesh):
             return self._load_mesh(shape, local, parts)
@@ -139,9 +143,9 @@ class Stage:
         assert isinstance(geometry, Mesh)
         properties = mi.Properties()
         for name, part in parts.items():
-            properties[name] = mi.load_dict(part)
-        mesh = mi.Mesh(shape.name, len(geometry.vertices), len(geometry.faces), properties,
-                       geometry.normals is not None, geometry.uv is not None)
+            properties[name] = part
+        mesh = mi.Mesh(self._ids[shape.name], len(geometry.vertices), len(geometry.faces),
+                       properties, geometry.normals is not None, geometry.uv is not None)
         parameters = mi.traverse(mesh)
         if geometry.uv is not None:
             parameters["vertex_texcoords"] = _buffer(geometry.uv)
@@ -159,16 +163,16 @@ class Stage:
                 del placed["faces"]
             self._mirrored[shape.name] = mirrored
             for key, value in placed.items():
-                self._parameters[f"{shape.name}.{key}"] = value
+                self._parameters[f"{self._ids[shape.name]}.{key}"] = value
         else:
             to_world = mi.Transform4f(_checked(shape, local).tolist())
-            self._parameters[f"{shape.name}.to_world"] = to_world
+            self._parameters[f"{self._ids[shape.name]}.to_world"] = to_world
 
     def _registry_table(self) -> mi.UInt32:
         registry_index = {s.id(): _registry_index(s) for s in self.mi_scene.shapes()}
         table = np.zeros(max(registry_index.values()) + 1, np.uint32)
         for object_id, name in enumerate(self.description.object_names):
-            table[registry_index[name]] = object_id
+            table[registry_index[self._ids[name]]] = object_id
         return mi.UInt32(table)
 
 
@@ -190,12 +194,6 @@ def _unit(description: Scene, eye: np.ndarray) -> float:
         reach.append(np.linalg.norm(points - eye, axis=1).max())
     typical = float(np.median(reach))
     return 2.0**round(np.log2(typical)) if 0 < typical < _SMALL else 1.0
-
-
-def _environment(radiance: Any) -> dict[str, Any]:
-    if not isinstance(radiance, np.ndarray):
-        return {"type": "constant", "radiance": _rgb(radiance)}
-    return {"type": "envmap", "bitmap": mi.Bitmap(radiance.astype(np.float32))}
 
 
 def _checked(shape: Shape, matrix: np.ndarray) -> np.ndarray:
@@ -237,23 +235,3 @@ def _cofactors(linear: np.ndarray) -> np.ndarray:
 
 def _buffer(array: np.ndarray) -> mi.Float:
     return mi.Float(array.astype(np.float32).ravel())
-
-
-def _rgb(color: tuple[float, float, float]) -> dict[str, Any]:
-    return {"type": "rgb", "value": list(map(float, color))}
-
-
-def _plugin(value: Any) -> Any:
-    """A plain material as a Mitsuba dictionary: tuples become colours, arrays bitmaps."""
-    if isinstance(value, tuple) and len(value) == 3:
-        return _rgb(value)
-    if isinstance(value, np.ndarray):
-        return _plugin({"type": "bitmap", "bitmap": value, "raw": True})
-    if not isinstance(value, Mapping):
-        return value
-    plugin = {key: mi.Bitmap(np.asarray(part, np.float32)) if key == "bitmap" else _plugin(part)
-              for key, part in value.items()}
-    if "uv_from_surface" in plugin:  # a texture's placement, a 4x4 matrix
-        plugin["to_uv"] = mi.ScalarTransform4f(np.asarray(value["uv_from_surface"]).tolist())
-        del plugin["uv_from_surface"]
-    return plugin

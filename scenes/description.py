@@ -5,26 +5,35 @@ between frames): any frame can be asked for alone, in any order, with the same r
 not move is given as a plain matrix, what moves as a function; a renderer updates only the latter.
 
 Materials are Mitsuba BSDF dictionaries in plain Python: colours as (r, g, b) tuples, textures as
-nested dictionaries, images as float (h, w, 3) arrays. See `scenes/materials.py`.
+nested dictionaries, images as float (h, w, 3) arrays of linear values (8-bit ones become such by
+`materials.srgb8`). See `scenes/materials.py`.
+
+What cannot be is refused where it is given, with a SceneError of one sentence. What a function of
+the frame returns is checked when it is asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from . import validity
+from .errors import SceneError
 from .transforms import Matrix, identity
 
 Color = tuple[float, float, float]
 Motion = Callable[[float], Matrix]
 Material = Mapping[str, Any]
+Radiance = Color | np.ndarray | Mapping[str, Any]
 
+MOST_FRAMES, LARGEST_SIDE, LONGEST_PATH = 100_000, 16384, 10_000
 
-class SceneError(ValueError):
-    """A scene that cannot be built. The message is one sentence meant for its author."""
+__all__ = ["Camera", "Color", "Cylinder", "Disk", "Geometry", "Material", "Mesh", "Motion",
+           "Rectangle", "Scene", "SceneError", "Shape", "Sphere"]
 
 
 @dataclass(frozen=True)
@@ -56,7 +65,8 @@ class Mesh:
         normals: (n, 3) for smooth shading, None for flat. uv: (n, 2) or None.
 
     Raises:
-        SceneError: shapes disagree, or a face names a vertex that is not there.
+        SceneError: shapes disagree, there is no face, something is not finite, or a face names
+            a vertex that is not there.
     """
 
     vertices: np.ndarray
@@ -65,21 +75,34 @@ class Mesh:
     uv: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        n = len(self.vertices)
+        n = len(self.vertices) if isinstance(self.vertices, Sized) else 0
         for name, columns in (("vertices", 3), ("normals", 3), ("uv", 2)):
             array = getattr(self, name)
             if array is not None:
-                array = np.asarray(array, np.float64)
+                try:
+                    array = np.asarray(array, np.float64)
+                except (TypeError, ValueError):
+                    raise SceneError(f"mesh {name} are not numbers in rows of {columns}") from None
                 if array.shape != (n, columns):
                     raise SceneError(f"mesh {name} have shape {array.shape}, "
                                      f"expected ({n}, {columns})")
+                if not (abs(array) <= validity.LARGEST).all():
+                    raise SceneError(f"mesh {name} are not all finite: replace what is NaN, "
+                                     f"infinite, or above {validity.LARGEST:g}")
                 object.__setattr__(self, name, array)
-        faces = np.asarray(self.faces)
+        try:
+            faces = np.asarray(self.faces)
+        except ValueError:
+            raise SceneError("mesh faces are not numbers in rows of 3") from None
         if faces.ndim != 2 or faces.shape[1] != 3 or not np.issubdtype(faces.dtype, np.integer):
             raise SceneError(f"mesh faces have shape {faces.shape} and type {faces.dtype}, "
                              "expected (m, 3) integers")
-        if faces.size and not (faces.min() >= 0 and faces.max() < n):
-            raise SceneError(f"mesh faces use vertex {faces.max()}, but there are {n} vertices")
+        if not faces.size:
+            raise SceneError("a mesh has no faces: give it at least one triangle, or leave it out")
+        if not (faces.min() >= 0 and faces.max() < n):
+            odd = faces.min() if faces.min() < 0 else faces.max()
+            raise SceneError(f"mesh faces use vertex {odd}, but there are {n} vertices, "
+                             "numbered from 0")
         object.__setattr__(self, "faces", faces.astype(np.uint32))
 
 
@@ -95,25 +118,52 @@ class Shape:
         geometry: what it is, in object space.
         material: a Mitsuba BSDF dictionary.
         world_from_object: a matrix, or a function of the frame number where it moves.
-        emission: radiance (r, g, b) of an area light, or a function of the frame number.
+        emission: radiance of an area light: (r, g, b), a number, or a function of the frame
+            number that returns one of these; where the geometry is no mesh also an (h, w, 3)
+            image over uv, the path of one, or a texture's dictionary.
     """
 
     name: str
     geometry: Geometry
     material: Material
     world_from_object: Matrix | Motion = field(default_factory=identity)
-    emission: Color | Callable[[float], Color] | None = None
+    emission: float | Radiance | Callable[[float], float | Color] | None = None
+
+    def __post_init__(self) -> None:
+        validity.text(self.name, "the name of a shape", 200)
+        if not isinstance(self.geometry, Geometry):
+            raise SceneError(f"the geometry of shape '{self.name}' is "
+                             f"{validity.brief(self.geometry)}: use Sphere(), Rectangle(), Disk(), "
+                             "Cylinder() or a Mesh")
+        validity.material(self.material, f"the material of shape '{self.name}'")
+        if not callable(self.world_from_object):
+            place = validity.matrix(self.world_from_object, f"the place of shape '{self.name}'")
+            object.__setattr__(self, "world_from_object", place)
+        if self.emission is not None and not callable(self.emission):
+            radiance = validity.emission(self.emission, f"the emission of shape '{self.name}'")
+            object.__setattr__(self, "emission", radiance)
 
     @property
     def moves(self) -> bool:
         return callable(self.world_from_object)
 
     def world_from_object_at(self, frame: float) -> Matrix:
+        """(4, 4) float64, affine and finite."""
         place = self.world_from_object
-        return np.asarray(place(frame) if callable(place) else place, np.float64)
+        if not callable(place):
+            return place
+        what = f"the place of '{self.name}' in frame {frame:g}"
+        return validity.matrix(_called(place, frame, what), what)
 
-    def emission_at(self, frame: float) -> Color | None:
-        return self.emission(frame) if callable(self.emission) else self.emission
+    def emission_at(self, frame: float) -> Radiance | None:
+        """Radiance; of a light that changes, (r, g, b)."""
+        if not callable(self.emission):
+            return self.emission  # type: ignore[return-value]  # checked, no number any more
+        what = f"the emission of '{self.name}' in frame {frame:g}"
+        radiance = validity.emission(_called(self.emission, frame, what), what)
+        if not isinstance(radiance, tuple):
+            raise SceneError(f"{what} is a texture: a light that changes has a colour, (r, g, b)")
+        return radiance
 
 
 @dataclass(frozen=True)
@@ -122,7 +172,7 @@ class Camera:
 
     Attributes:
         world_from_camera: a matrix (see `transforms.look_at`), or a function of the frame.
-            Camera space: x right, y down, z forward; a rigid transform.
+            Camera space: x right, y down, z forward; a rigid transform (to 1e-4).
         fov: vertical field of view, degrees.
     """
 
@@ -130,16 +180,24 @@ class Camera:
     fov: float = 40.0
 
     def __post_init__(self) -> None:
-        if not 0 < self.fov < 180:
-            raise SceneError(f"the camera's field of view is {self.fov} degrees: use 0 to 180")
+        fov = validity.number(self.fov, "the camera's field of view")
+        if not 0.01 <= fov <= 179:
+            raise SceneError(f"the camera's field of view is {self.fov} degrees: use 0.01 to 179")
+        if not callable(self.world_from_camera):
+            place = validity.rigid(self.world_from_camera, "the place of 'camera'")
+            object.__setattr__(self, "world_from_camera", place)
 
     @property
     def moves(self) -> bool:
         return callable(self.world_from_camera)
 
     def world_from_camera_at(self, frame: float) -> Matrix:
+        """(4, 4) float64, rigid."""
         place = self.world_from_camera
-        return np.asarray(place(frame) if callable(place) else place, np.float64)
+        if not callable(place):
+            return place
+        what = f"the place of 'camera' in frame {frame:g}"
+        return validity.rigid(_called(place, frame, what), what)
 
     def screen_from_camera(self, height: int, width: int) -> Matrix:
         """Projection to pixels: x in [0, w), y in [0, h) down after dividing by depth.
@@ -164,8 +222,8 @@ class Scene:
         width, height: default size in pixels.
         max_depth: longest path in segments, camera ray included (2: direct light only),
             as in Mitsuba's `path`.
-        environment: radiance of everything that is not a shape: (r, g, b), or an (h, w, 3) image
-            by latitude (from +y down) and longitude, or None.
+        environment: radiance of everything that is not a shape: (r, g, b), a number, or an
+            (h, w, 3) image by latitude (from +y down) and longitude, or the path of one; or None.
     """
 
     name: str
@@ -177,28 +235,54 @@ class Scene:
     height: int
     max_depth: int = 6
     fps: int = 24
-    environment: Color | np.ndarray | None = None
+    environment: float | str | Path | Radiance | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "shapes", tuple(sorted(self.shapes, key=lambda s: s.name)))
+        what = f"scene '{validity.text(self.name, 'the name of a scene', 100)}' has"
+        shapes = self.shapes
+        if isinstance(shapes, Shape) or not isinstance(shapes, Iterable):
+            raise SceneError(f"{what} {validity.brief(type(shapes).__name__)} as its shapes: use a "
+                             "tuple of Shape")
+        shapes = tuple(shapes)
+        for shape in shapes:
+            if not isinstance(shape, Shape):
+                raise SceneError(f"{what} {validity.brief(shape)} among its shapes: use Shape(...) "
+                                 "only, with * before a list of them")
+        object.__setattr__(self, "shapes", tuple(sorted(shapes, key=lambda s: s.name)))
         names = [shape.name for shape in self.shapes]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise SceneError(f"scene '{self.name}' has two shapes named '{twice[0]}'")
         if not names:
             raise SceneError(f"scene '{self.name}' has no shapes")
-        for name in ("frames", "width", "height", "max_depth", "fps"):
-            if getattr(self, name) < 1:
-                raise SceneError(f"scene '{self.name}' has {name} = {getattr(self, name)}: "
-                                 "use 1 or more")
-        if isinstance(self.environment, np.ndarray):
-            shape = self.environment.shape
-            if len(shape) != 3 or shape[2] != 3 or not np.isfinite(self.environment).all():
-                raise SceneError(f"scene '{self.name}' has an environment image of shape {shape}: "
-                                 "use (h, w, 3), all of it finite")
-        if self.environment is None and not any(shape.emission for shape in self.shapes):
+        if not isinstance(self.camera, Camera):
+            raise SceneError(f"{what} {validity.brief(self.camera)} as its camera: use Camera(...)")
+        if not isinstance(self.about, str) or not (self.about or "-").isprintable():
+            raise SceneError(f"{what} about = {validity.brief(self.about)}: use one line of text")
+        for name, most in (("frames", MOST_FRAMES), ("width", LARGEST_SIDE),
+                           ("height", LARGEST_SIDE), ("max_depth", LONGEST_PATH), ("fps", 1000)):
+            value = validity.whole(getattr(self, name), f"{what} {name}", 1, most)
+            object.__setattr__(self, name, value)
+        if self.environment is not None:
+            around = validity.environment(self.environment,
+                                          f"the environment of scene '{self.name}'")
+            object.__setattr__(self, "environment", around)
+        elif all(shape.emission is None for shape in self.shapes):
             raise SceneError(f"scene '{self.name}' has no light: give a shape an emission, "
                              "or the scene an environment")
+
+    def try_frames(self, frames: Iterable[float]) -> None:
+        """Ask for everything that changes in each of these frames, so that a mistake shows now.
+
+        Raises:
+            SceneError: something is not there, or is not what it may be.
+        """
+        moving = [shape for shape in self.shapes if shape.moves or callable(shape.emission)]
+        for frame in frames:
+            self.camera.world_from_camera_at(frame)
+            for shape in moving:
+                shape.world_from_object_at(frame)
+                shape.emission_at(frame)
 
     @property
     def object_names(self) -> tuple[str, ...]:
@@ -210,3 +294,13 @@ class Scene:
         """Names of what moves, 'camera' first if it does."""
         return (("camera",) if self.camera.moves else ()) + tuple(
             shape.name for shape in self.shapes if shape.moves)
+
+
+def _called(function: Callable[[float], Any], frame: float, what: str) -> Any:
+    """What a function of the frame returns; SceneError where it raises."""
+    try:
+        return function(frame)
+    except (SceneError, MemoryError):
+        raise
+    except Exception as error:  # the author's own code may raise anything
+        raise SceneError(f"{what} raises {type(error).__name__}: {error}") from error

@@ -1,7 +1,8 @@
 """Materials and textures as plain Python: Mitsuba BSDF dictionaries without Mitsuba.
 
 Colours are linear sRGB reflectances; so are images, float64 (h, w, 3) arrays whose first row is
-the top (v = 1). Patterns come from a seed and nothing else.
+the top (v = 1). What a paint program or an 8-bit file holds is made linear by `rgb` and `srgb8`.
+Patterns come from a seed and nothing else.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from . import validity
 from .description import Color, SceneError
 from .transforms import scale
 
@@ -26,8 +28,44 @@ def rgb(code: str) -> Color:
         srgb = [int(code[i:i + 2], 16) / 255 for i in (1, 3, 5)]
     except ValueError:
         raise SceneError(f"a colour is {code!r}: use '#rrggbb'") from None
-    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in srgb)
+    r, g, b = map(_linear, srgb)
     return r, g, b
+
+
+def srgb8(pixels: Any) -> np.ndarray:
+    """An 8-bit sRGB picture as linear reflectances (or radiances), (h, w, 3) float64.
+
+        image(srgb8(PIL.Image.open("poster.png")))
+
+    pixels: a Pillow image, or a uint8 array (h, w), (h, w, 1), (h, w, 3), or (h, w, 4) if it is
+    opaque. Data that are not colours (roughness, opacity, normals) are linear as they are: divide
+    those by 255.
+
+    Raises:
+        SceneError: not 8-bit, another shape, or transparent somewhere.
+    """
+    if hasattr(pixels, "convert") and hasattr(pixels, "mode"):  # Pillow; palettes and CMYK too
+        if pixels.mode[0] in "IF":
+            raise SceneError(f"a picture has mode {pixels.mode}, which is not 8-bit: divide its "
+                             "array by its largest value instead")
+        pixels = pixels.convert("RGBA")
+    codes = np.asarray(pixels)
+    if codes.dtype != np.uint8:
+        raise SceneError(f"a picture is of {codes.dtype}: srgb8 is for 8-bit ones (uint8)")
+    codes = codes[..., None] if codes.ndim == 2 else codes
+    if codes.ndim != 3 or codes.shape[2] not in (1, 3, 4) or not codes.size:
+        raise SceneError(f"a picture has shape {np.shape(pixels)}: use (h, w), (h, w, 3) or "
+                         "(h, w, 4), with pixels")
+    if codes.shape[2] == 4 and (codes[..., 3] < 255).any():
+        raise SceneError("a picture is transparent in places: lay it on a background, or use its "
+                         "alpha / 255 as the opacity of a mask")
+    color = np.broadcast_to(codes[..., :3], (*codes.shape[:2], 3))
+    return np.array([_linear(code / 255) for code in range(256)])[color]
+
+
+def _linear(srgb: float) -> float:
+    """IEC 61966-2-1, from [0, 1] to [0, 1]."""
+    return srgb / 12.92 if srgb <= 0.04045 else ((srgb + 0.055) / 1.055) ** 2.4
 
 
 def diffuse(color: Texture) -> dict[str, Any]:
@@ -56,7 +94,14 @@ def checks(a: Color, b: Color, repeat: tuple[float, float] = (4, 4)) -> dict[str
 
 
 def image(pixels: np.ndarray, repeat: tuple[float, float] = (1, 1)) -> dict[str, Any]:
-    """A texture from (h, w, 3) linear reflectances, repeated along u and v."""
+    """A texture from (h, w, 3) linear reflectances, repeated along u and v.
+
+    8-bit pictures go through `srgb8` first.
+
+    Raises:
+        SceneError: whole numbers, another shape, no pixels, or not finite.
+    """
+    validity.image(pixels, "a texture", validity.ANY)
     return {"type": "bitmap", "bitmap": np.asarray(pixels), "raw": True,
             "uv_from_surface": scale((*repeat, 1))}
 

@@ -216,7 +216,7 @@ def test_scene_file_is_loaded(tmp_path):
     ("def scene():\n    return 4\n", "no scene here"),
     ("def scene(size):\n    return size\n", "TypeError"),
     (FILE.replace(MOTION, "lambda frame: translate((1 / (frame - 2), 0, 0))"),
-     "line 7: ZeroDivisionError"),
+     "line 7: the place of 'lamp' in frame 2 raises ZeroDivisionError"),
     (FILE.replace(MOTION, "lambda frame: (1, 2)"), "place of 'lamp' in frame 0"),
     ("\0", "mine.py"),
 ])

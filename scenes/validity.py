@@ -1,0 +1,300 @@
+"""What the values of a scene may be, checked where they are given: plain Python and NumPy.
+
+Mitsuba checks some of this, stops the whole process at some (a property that is None, an image
+without pixels) and takes the rest as it comes: a reflectance of 255, NaN, a sheared camera. Each
+check here returns the value in the one form that the rest of the code knows, or raises a SceneError
+that says what is wrong, where, and what to do. `what` is where: "the emission of shape 'lamp'".
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+import os
+import reprlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .errors import SceneError
+
+Bounds = tuple[float, float]
+
+ANY: Bounds = (-math.inf, math.inf)
+FRACTION: Bounds = (0.0, 1.0)
+POSITIVE: Bounds = (0.0, math.inf)
+
+# Properties of Mitsuba's BSDFs that are fractions, whether numbers, colours or textures.
+_FRACTIONS = frozenset((
+    "reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance",
+    "transmittance", "base_color", "opacity", "weight", "roughness", "metallic", "anisotropic",
+    "spec_tint", "spec_trans", "sheen", "sheen_tint", "clearcoat", "clearcoat_gloss", "flatness"))
+_NOT_NEGATIVE = frozenset(("alpha", "alpha_u", "alpha_v", "eta", "k", "int_ior", "ext_ior",
+                           "specular", "diff_trans"))
+_OF_A_TEXTURE = frozenset(("bitmap", "color0", "color1", "value"))  # as its property is bounded
+PLACEMENTS = ("uv_from_surface", "to_uv")
+_DEEPEST = 16
+LARGEST = 1e30  # Mitsuba computes in float32, where 1e39 is infinite
+_ROUNDING = 1e-6
+_RIGID = 1e-4  # a matrix written with four decimals still passes; it moves no pixel by a tenth
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where in a dictionary a value is: "'bsdf.reflectance' of the material of shape 'x'"."""
+
+    owner: str
+    path: str = ""
+
+    def inside(self, key: str) -> Place:
+        return replace(self, path=f"{self.path}.{key}" if self.path else key)
+
+    def __str__(self) -> str:
+        return f"'{self.path}' of {self.owner}" if self.path else self.owner
+
+
+def brief(value: object) -> str:
+    """A value for a message: short, on one line."""
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape} and type {value.dtype}"
+    return " ".join(reprlib.repr(value).split())
+
+
+def number(value: Any, what: str, bounds: Bounds = ANY) -> float:
+    """A finite number within bounds, as a float."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
+        raise SceneError(f"{what} is {brief(value)}: use a number")
+    return float(_within(np.asarray(_float(value)), what, bounds))
+
+
+def whole(value: Any, what: str, least: int, most: int) -> int:
+    """A whole number from `least` to `most`, as an int."""
+    if (isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real)
+            or not _float(value).is_integer()):
+        raise SceneError(f"{what} = {brief(value)}: use a whole number from {least} to {most}")
+    if not least <= value <= most:
+        raise SceneError(f"{what} = {brief(value)}: use {least} or more" if value < least else
+                         f"{what} = {brief(value)}: use at most {most}")
+    return int(_float(value))
+
+
+def text(value: Any, what: str, longest: int) -> str:
+    """Text that can be shown, written to files, and is not empty."""
+    if not isinstance(value, str) or not value or len(value) > longest or not value.isprintable():
+        raise SceneError(f"{what} is {brief(value)}: use text of 1 to {longest} printable letters")
+    return value
+
+
+def matrix(value: Any, what: str) -> np.ndarray:
+    """A transform: (4, 4) float64, finite, its last row (0, 0, 0, 1)."""
+    try:
+        found = np.array(value, np.float64)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if found.shape != (4, 4) or not (abs(found) <= LARGEST).all():
+        raise SceneError(f"{what} is not a 4x4 matrix of numbers of up to {LARGEST:g}")
+    if not np.array_equal(found[3], (0, 0, 0, 1)):
+        raise SceneError(f"{what} has {found[3].tolist()} as its last row: use (0, 0, 0, 1), with "
+                         "the translation in the last column")
+    return found
+
+
+def rigid(value: Any, what: str) -> np.ndarray:
+    """A transform that only turns and moves.
+
+    Uniform scale is refused too: it would scale depths, which are world units. So is a mirror: the
+    axes were mistaken, more often than a mirrored picture is meant.
+    """
+    found = matrix(value, what)
+    axes = found[:3, :3]
+    lengths = np.linalg.norm(axes, axis=0)
+    directions = axes / np.maximum(lengths, 1e-300)
+    if abs(directions.T @ directions - np.diag(lengths > 0)).max() > _RIGID:
+        raise SceneError(f"{what} is sheared: a camera only turns and moves, make the first three "
+                         "columns perpendicular (see transforms.look_at)")
+    if abs(lengths - 1).max() > _RIGID:
+        raise SceneError(f"{what} scales its axes by {np.round(lengths, 4).tolist()}: a camera "
+                         "only turns and moves, divide each of the first three columns by its "
+                         "length")
+    if np.linalg.det(axes) < 0:
+        raise SceneError(f"{what} mirrors the picture: its columns are the camera's axes, x to the "
+                         "right, y down and z forward (see transforms.look_at)")
+    return found
+
+
+def color(value: Any, what: str, bounds: Bounds = POSITIVE) -> tuple[float, float, float]:
+    """Three numbers of a tuple, a list or an array."""
+    found = _numbers(value, what)
+    if found.shape != (3,):
+        raise SceneError(f"{what} is {brief(value)}: use a colour, (r, g, b)")
+    r, g, b = _within(found, what, bounds).tolist()
+    return r, g, b
+
+
+def image(value: Any, what: str, bounds: Bounds = POSITIVE) -> np.ndarray:
+    """An image of linear values with at least one pixel, (h, w), (h, w, 1) or (h, w, 3) floats."""
+    found = np.asarray(value)
+    if np.issubdtype(found.dtype, np.integer) or found.dtype == bool:
+        raise SceneError(f"{what} is an image of whole numbers ({found.dtype}): make 8-bit colours "
+                         "linear with scenes.materials.srgb8(...), and divide other data by its "
+                         "largest value")
+    found = _numbers(found, what)
+    if found.ndim not in (2, 3) or (found.ndim == 3 and found.shape[2] not in (1, 3)):
+        raise SceneError(f"{what} is an image of shape {found.shape}: use (h, w) or (h, w, 3)")
+    if not found.size:
+        raise SceneError(f"{what} is an image of shape {found.shape}: use one that has pixels")
+    _within(found, what, bounds)
+    return found
+
+
+def material(value: Any, what: str) -> Mapping[str, Any]:
+    """A BSDF dictionary all of whose values are of kinds that Mitsuba survives."""
+    if not isinstance(value, Mapping):
+        raise SceneError(f"{what} is {brief(value)}: use a material, such as "
+                         "scenes.materials.diffuse((0.8, 0.3, 0.2))")
+    _check_plugin(value, Place(what), ANY, 0)
+    return value
+
+
+def emission(value: Any, what: str) -> tuple[float, float, float] | np.ndarray | Mapping[str, Any]:
+    """Radiance: a number, a colour, an image, a texture's dictionary, or an image's path."""
+    if isinstance(value, str | os.PathLike):
+        return {"type": "bitmap", "filename": _path(value, what)}
+    if isinstance(value, Mapping):
+        if value.get("type") == "area" and set(value) == {"type", "radiance"}:
+            return emission(value["radiance"], what)
+        if value.get("type") == "rgb":
+            return color(value.get("value"), what)
+        # A checkerboard's colours are reflectances for Mitsuba, whatever it is used for.
+        _check_plugin(value, Place(what),
+                      FRACTION if value.get("type") == "checkerboard" else POSITIVE, 0)
+        return value
+    return _radiance(value, what)
+
+
+def environment(value: Any, what: str) -> tuple[float, float, float] | np.ndarray | Mapping:
+    """Radiance from all around: a number, a colour, an (h, w, 3) image, or an image's path.
+
+    A path becomes Mitsuba's dictionary of it, {"type": "envmap", "filename": ...}.
+    """
+    if isinstance(value, str | os.PathLike):
+        return {"type": "envmap", "filename": _path(value, what)}
+    if isinstance(value, Mapping):
+        for kind, key in (("envmap", "filename"), ("envmap", "bitmap"), ("constant", "radiance")):
+            if value.get("type") == kind and set(value) == {"type", key}:
+                return environment(value[key], what)
+        raise SceneError(f"{what} is {brief(dict(value))}: use a number, a colour, an image, or "
+                         "the path of one")
+    found = _radiance(value, what)
+    if isinstance(found, np.ndarray) and found.shape[2:] != (3,):
+        raise SceneError(f"{what} is an image of shape {found.shape}: use (h, w, 3)")
+    return found
+
+
+def _radiance(value: Any, what: str) -> tuple[float, float, float] | np.ndarray:
+    if np.ndim(_array(value, what)) == 0:
+        gray = number(value, what, POSITIVE)
+        return gray, gray, gray
+    if np.ndim(value) == 1:
+        return color(value, what)
+    return image(value, what)
+
+
+def _check_plugin(plugin: Mapping[Any, Any], place: Place, bounds: Bounds, depth: int) -> None:
+    """Check every value of a dictionary of Mitsuba's; `bounds` are those of its colours."""
+    if depth > _DEEPEST:
+        raise SceneError(f"{place.owner} is nested more than {_DEEPEST} deep: use a simpler one")
+    kind = plugin.get("type")
+    if not isinstance(kind, str) or not kind:
+        raise SceneError(f"{place} has no type: give it one, such as \"type\": \"diffuse\"")
+    for key, value in plugin.items():
+        if not isinstance(key, str) or not key or "." in key:
+            raise SceneError(f"{place} has a property {brief(key)}: use a name without dots")
+        if key != "type":
+            _check_value(kind, key, value, place.inside(key), bounds_of(key, bounds), depth)
+
+
+def bounds_of(key: str, inherited: Bounds) -> Bounds:
+    """What a property of a BSDF, or of a texture with inherited bounds, may be."""
+    if key in _OF_A_TEXTURE:
+        return inherited
+    return FRACTION if key in _FRACTIONS else POSITIVE if key in _NOT_NEGATIVE else ANY
+
+
+def _check_value(kind: str, key: str, value: Any, place: Place, bounds: Bounds,
+                 depth: int) -> None:
+    what = str(place)
+    if key == "bitmap":
+        image(value, what, bounds)
+    elif key in PLACEMENTS:
+        matrix(value, what)
+    elif key == "filename":
+        _path(value, what)
+    elif kind == "rgb" and key == "value":
+        color(value, what, (0.0, bounds[1]))
+    elif kind == "spectrum" and key == "value" and np.ndim(value) == 2:
+        if np.shape(_numbers(value, what))[1] != 2:
+            raise SceneError(f"{what} is {brief(value)}: use pairs (wavelength, value)")
+    elif isinstance(value, Mapping):
+        _check_plugin(value, place, bounds, depth + 1)
+    elif isinstance(value, tuple | list | np.ndarray) and np.ndim(_array(value, what)):
+        if np.ndim(value) == 1:
+            color(value, what, (0.0, bounds[1]))
+        else:
+            image(value, what, bounds)
+    elif isinstance(value, numbers.Real | np.ndarray) and not isinstance(value, bool):
+        number(value, what, bounds)
+    elif not isinstance(value, str | bool | np.bool_):
+        todo = "leave it out, or give" if value is None else "use"
+        raise SceneError(f"{what} is {brief(value)}: {todo} a number, a colour, an image or a "
+                         "dictionary")
+
+
+def _path(value: Any, what: str) -> str:
+    if not isinstance(value, str | os.PathLike) or not os.fspath(value):
+        raise SceneError(f"{what} is {brief(value)}: use the path of a file")
+    found = os.fspath(value)
+    return os.fsdecode(found) if isinstance(found, bytes) else found
+
+
+def _array(value: Any, what: str) -> np.ndarray:
+    try:
+        return np.asarray(value)
+    except (TypeError, ValueError):
+        raise SceneError(f"{what} is {brief(value)}: use numbers in rows of one length") from None
+
+
+def _float(value: Any) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # of an int
+        return math.inf
+
+
+def _numbers(value: Any, what: str) -> np.ndarray:
+    """The value as float64, if it is made of real numbers."""
+    found = _array(value, what)
+    if not (np.issubdtype(found.dtype, np.floating) or np.issubdtype(found.dtype, np.integer)):
+        raise SceneError(f"{what} is {brief(value)}: use numbers")
+    return found.astype(np.float64)
+
+
+def _within(found: np.ndarray, what: str, bounds: Bounds) -> np.ndarray:
+    """The array, if finite and within bounds; what roundings pushed over them is put back."""
+    low, high = bounds
+    if not (abs(found) <= LARGEST).all():
+        raise SceneError(f"{what} is not finite: replace what is NaN, infinite, or above "
+                         f"{LARGEST:g}")
+    if not found.size:
+        return found
+    least, most = float(found.min()), float(found.max())
+    if least < low - _ROUNDING or most > high + _ROUNDING:
+        odd = least if least < low - _ROUNDING else most
+        hint = " (8-bit colours become linear with scenes.materials.srgb8)" if most > 1 else ""
+        use = f"{low:g} to {high:g}{hint}" if high < math.inf else f"{low:g} or more"
+        raise SceneError(f"{what} {'is' if found.ndim == 0 else 'holds'} {odd:.6g}: use {use}")
+    return np.clip(found, low, high)

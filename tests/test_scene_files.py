@@ -1,0 +1,160 @@
+"""Scene files and what lies beside them: neighbours, textures, and names that are taken."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenes.catalog import load
+from scenes.description import SceneError
+
+HEAD = """
+from scenes.description import Camera, Rectangle, Scene, Shape
+from scenes.materials import diffuse
+from scenes.transforms import look_at
+"""
+FILE = HEAD + """
+from parts import COLOR
+
+def scene(environment=0.5, material=None):
+    shape = Shape("x", Rectangle(), material or diffuse(COLOR))
+    return Scene("mine", "one", (shape,), Camera(look_at((0, 0, 4), (0, 0, 0))), 2, 8, 6,
+                 environment=environment)
+"""
+
+
+def write(folder: Path, **files: str) -> str:
+    """Files of a folder, NAME.py with their text; the path of the scene's."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in files.items():
+        (folder / f"{name}.py").write_text(text)
+    return str(folder / "mine.py")
+
+
+def color_of(scene) -> tuple:
+    return scene.shapes[0].material["bsdf"]["reflectance"]
+
+
+def test_a_file_imports_its_neighbours_and_leaves_nothing_behind(tmp_path):
+    path, modules, here = list(sys.path), set(sys.modules), os.getcwd()
+    mine = write(tmp_path, mine="import os\nos.chdir('/')\n" + FILE,
+                 parts="from colours.red import RED as COLOR\n")
+    write(tmp_path / "colours", red="from .dark import DARK as RED\n", dark="DARK = (.3, 0, 0)\n")
+    assert color_of(load(mine)) == (0.3, 0, 0)
+    assert sys.path == path
+    assert not {"parts", "colours", "colours.red", "scene_file"} & (set(sys.modules) - modules)
+    assert os.getcwd() == here
+    assert not list(tmp_path.rglob("__pycache__"))
+
+
+def test_neighbours_of_two_files_do_not_meet_and_are_read_again(tmp_path):
+    first = write(tmp_path / "a", mine=FILE, parts="COLOR = (0.1, 0, 0)")
+    second = write(tmp_path / "b", mine=FILE, parts="COLOR = (0.2, 0, 0)")
+    assert [color_of(load(p))[0] for p in (first, second, first)] == [0.1, 0.2, 0.1]
+    write(tmp_path / "a", parts="COLOR = (0.3, 0, 0)")
+    assert color_of(load(first))[0] == 0.3
+
+
+def test_what_is_left_when_a_file_fails_is_cleared_away_too(tmp_path):
+    path = list(sys.path)
+    mine = write(tmp_path, mine="import sys\nsys.path.insert(0, '/nowhere')\nimport parts\n1 / 0\n",
+                 parts="")
+    with pytest.raises(SceneError, match="line 4: ZeroDivisionError"):
+        load(mine)
+    assert sys.path == path
+    assert not {"parts", "scene_file"} & set(sys.modules)
+
+
+def test_a_files_own_dataclasses_and_imports_in_functions_work(tmp_path):
+    mine = write(tmp_path, parts="COLOR = (0.1, 0, 0)", mine=(
+        "from __future__ import annotations\nfrom dataclasses import dataclass\n"
+        + FILE.replace("from parts import COLOR", "").replace("    shape =", """
+    from parts import COLOR
+    @dataclass
+    class Own:
+        x: int
+    shape =""")))
+    assert color_of(load(mine))[0] == 0.1
+
+
+TAKEN = ("render", "scenes", "denoise", "onespp", "numpy", "mitsuba", "drjit", "click", "secrets",
+         "bisect", "wave", "scene_file")
+
+
+def test_neighbours_with_names_of_the_library_take_nothing_from_it(tmp_path):
+    """A whole render, in a process of its own, whose first imports come after the scene's."""
+    mine = write(tmp_path, mine="import secrets, wave\n" + FILE, parts="COLOR = (0.1, 0, 0)",
+                 **{name: "raise RuntimeError('the wrong one')" for name in TAKEN})
+    program = ("import sys; sys.path[:] = [p for p in sys.path if p]; import onespp; "
+               f"sys.argv = ['onespp', 'render', {mine!r}, '--out', {str(tmp_path / 'out')!r}]; "
+               "onespp.main()")
+    done = subprocess.run([sys.executable, "-c", program], text=True, capture_output=True,
+                          timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out/frames/0001.exr").is_file()
+
+
+@pytest.mark.parametrize("line", ["from render import FLOOR", "import render; render.FLOOR"])
+def test_a_neighbour_whose_name_is_taken_is_said_to_be(tmp_path, line):
+    mine = write(tmp_path, mine=HEAD + line, render="FLOOR = 1")
+    with pytest.raises(SceneError, match=r"line 5: .*'render' is an installed package.*another na"):
+        load(mine)
+
+
+def test_an_import_that_comes_too_late_is_one_sentence(tmp_path):
+    """Neighbours can be imported while the file runs, and while its frames are tried out."""
+    mine = write(tmp_path, mine=FILE.replace("(0, 0, 4), (0, 0, 0))", "(0, 0, 4), (0, 0, 0))"),
+                 parts="COLOR = (0.1, 0, 0)")
+    text = Path(mine).read_text().replace(
+        'diffuse(COLOR))', 'diffuse(COLOR), world_from_object=moved)').replace(
+        "def scene", "def moved(frame):\n    if frame > 1:\n        import late\n"
+        "    return look_at((0, 0, 0), (0, 0, -1), (0, -1, 0))\n\ndef scene")
+    write(tmp_path, mine=text, late="")
+    scene = load(mine)
+    with pytest.raises(SceneError, match="place of 'x' in frame 2 raises ModuleNotFoundError"):
+        scene.try_frames([2])
+
+
+# Files that a scene names
+
+
+def pictures(folder: Path) -> None:
+    from render.variant import mi
+
+    mi.Bitmap(np.full((2, 4, 3), 0.25, np.float32)).write(str(folder / "tex.exr"))
+    mi.Bitmap(np.full((2, 4, 3), 3, np.float32)).write(str(folder / "sky.exr"))
+
+
+@pytest.mark.parametrize("named", ["relative", "from elsewhere"])
+def test_files_are_found_from_the_scenes_folder(tmp_path, monkeypatch, named):
+    from render.renderer import Renderer
+
+    texture = '{"type": "diffuse", "reflectance": {"type": "bitmap", "filename": "tex.exr"}}'
+    path = write(tmp_path / "s", parts="COLOR = (0, 0, 0)", mine=FILE.replace(
+        "environment=0.5, material=None", f'environment="sky.exr", material={texture}'))
+    pictures(tmp_path / "s")
+    monkeypatch.chdir(tmp_path if named == "relative" else "/")
+    scene = load("s/mine.py" if named == "relative" else path)
+    monkeypatch.chdir(Path(__file__).parent)
+    frame = Renderer(scene, 6, 8).frame(0, 0, ("albedo", "emission"))
+    np.testing.assert_allclose(frame["albedo"][3, 4], 0.25)
+    np.testing.assert_allclose(frame["emission"][0, 0], 3)
+
+
+def test_a_file_that_is_missing_is_named_with_where_it_was_looked_for(tmp_path, call):
+    path = write(tmp_path / "s", parts="COLOR = (0, 0, 0)", mine=FILE.replace(
+        "environment=0.5", 'environment="sky.exr"'))
+    code, _, error = call("render", path, "--out", tmp_path / "out")
+    assert code == 2
+    assert str(tmp_path / "s/sky.exr") in error
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["..", ".", "a/b", " ", "a" * 101])
+def test_a_scenes_name_that_is_no_file_name_is_refused(tmp_path, name):
+    path = write(tmp_path, parts="COLOR = (0, 0, 0)", mine=FILE.replace('"mine"', repr(name)))
+    with pytest.raises(SceneError, match="name"):
+        load(path)
