@@ -159,6 +159,10 @@ def set_threads(count: int | None) -> None:
     if count is not None:
         if count < 1:
             raise InputError(f"--threads is {count}: use 1 or more")
+        most = max(64, 4 * (os.cpu_count() or 1))
+        if count > most:  # the system refuses some number, and then there is no way back
+            raise InputError(f"--threads is {count}: use at most {most}, this machine has "
+                             f"{os.cpu_count()} processors")
         import drjit as dr
 
         dr.set_thread_count(count)

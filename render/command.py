@@ -89,8 +89,8 @@ def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: st
               direct: str, sampler: str, overwrite: bool) -> Sequence:
     """Do what the options of a command ask."""
     scene = catalog.load(scene_name)
-    height, width = parse_size(size) if size else (scene.height, scene.width)
-    numbers = parse_frames(frames) if frames else tuple(range(scene.frames))
+    height, width = parse_size(size) if size is not None else (scene.height, scene.width)
+    numbers = parse_frames(frames) if frames is not None else tuple(range(scene.frames))
     if seed < 0:
         raise InputError(f"--seed is {seed}: use 0 or more")
     require_memory(height, width)

@@ -99,6 +99,8 @@ def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
     """
     if job.reference_spp is not None:
         pass_sizes(job.reference_spp)
+    job.scene.try_frames(job.frames)  # they may lie beyond those that the scene file was tried at
+    _ = job.renderer  # a scene that can't be built replaces nothing
     sequence = FrameSequence.create(folder, job.manifest(), overwrite)
     provenance = {"software": f"onespp {versions()['onespp']}", "scene": job.scene.name,
                   "sceneFingerprint": sequence.manifest.fingerprint, "seed": str(job.seed),

@@ -25,6 +25,7 @@ from .sequence import Reference
 LARGEST_PASS = 64  # samples; float32 sums inside a pass stay exact to ~1e-6
 MOST_PATHS = 1 << 24  # a pass; some seconds, after which it can be stopped
 FEWEST_PASSES = 8  # so that the variance has a few degrees of freedom
+MOST_SAMPLES = 1 << 24
 
 
 @dataclass
@@ -68,10 +69,13 @@ def pass_sizes(spp: int, pixels: int = 1) -> list[int]:
     """Samples of each pass, for images of that many pixels.
 
     Raises:
-        InputError: fewer than 2 samples, which have no variance.
+        InputError: fewer than 2 samples, which have no variance; or more than MOST_SAMPLES.
     """
     if spp < 2:
         raise InputError(f"a reference of {spp} spp has no variance: use 2 spp or more")
+    if spp > MOST_SAMPLES:
+        raise InputError(f"a reference of {spp:.3g} spp is beyond float32: use at most "
+                         f"{MOST_SAMPLES}")
     largest = max(1, min(LARGEST_PASS, MOST_PATHS // pixels))
     passes = min(spp, max(FEWEST_PASSES, -(-spp // largest)))
     size, larger = divmod(spp, passes)

@@ -24,6 +24,7 @@ from . import plugins
 from .variant import mi
 
 _SMALL = 0.125   # a scene that reaches less far has a unit of its own
+_SHEARED = 1e-4  # how far axes may be from perpendicular, as a cosine
 _DOT = 1e-7      # half the size of what has none, in stage units
 
 _ANALYTIC = {Sphere: "sphere", Rectangle: "rectangle", Disk: "disk", Cylinder: "cylinder"}
@@ -209,6 +210,10 @@ def _checked(shape: Shape, matrix: np.ndarray) -> np.ndarray:
         if sizes.max() > sizes.min() * (1 + 1e-6):
             raise SceneError(f"shape '{shape.name}' is a {type(shape.geometry).__name__} with "
                              f"non-uniform scale {np.round(sizes, 4).tolist()}: use a mesh")
+        axes = matrix[:3, :3] / sizes
+        if abs(axes.T @ axes - np.eye(3)).max() > _SHEARED:
+            raise SceneError(f"shape '{shape.name}' is a {type(shape.geometry).__name__} that its "
+                             "matrix shears: use a mesh")
     return matrix
 
 

@@ -234,7 +234,7 @@ class Scene:
     width: int
     height: int
     max_depth: int = 6
-    fps: int = 24
+    fps: float = 24
     environment: float | str | Path | Radiance | None = None
 
     def __post_init__(self) -> None:
@@ -260,9 +260,12 @@ class Scene:
         if not isinstance(self.about, str) or not (self.about or "-").isprintable():
             raise SceneError(f"{what} about = {validity.brief(self.about)}: use one line of text")
         for name, most in (("frames", MOST_FRAMES), ("width", LARGEST_SIDE),
-                           ("height", LARGEST_SIDE), ("max_depth", LONGEST_PATH), ("fps", 1000)):
+                           ("height", LARGEST_SIDE), ("max_depth", LONGEST_PATH)):
             value = validity.whole(getattr(self, name), f"{what} {name}", 1, most)
             object.__setattr__(self, name, value)
+        fps = validity.number(self.fps, f"{what} fps that")
+        if not 1 <= fps <= 1000:
+            raise SceneError(f"{what} fps = {self.fps}: use 1 to 1000")
         if self.environment is not None:
             around = validity.environment(self.environment,
                                           f"the environment of scene '{self.name}'")
@@ -303,4 +306,4 @@ def _called(function: Callable[[float], Any], frame: float, what: str) -> Any:
     except (SceneError, MemoryError):
         raise
     except Exception as error:  # the author's own code may raise anything
-        raise SceneError(f"{what} raises {type(error).__name__}: {error}") from error
+        raise SceneError(f"{what} raises {validity.said(error)}") from error

@@ -23,6 +23,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from . import validity
 from .description import Scene, SceneError, Shape
 
 _MODULE = "scene_file"  # the file's __name__
@@ -34,8 +35,13 @@ def load_file(path: Path) -> Scene:
     Raises:
         SceneError: there is no such file, it raises, or it defines no scene.
     """
-    if not path.is_file():
-        raise SceneError(f"there is no scene file '{path}'")
+    shown = validity.brief(str(path))
+    try:
+        there = path.is_file()
+    except (OSError, ValueError):  # a name that is too long, say
+        there = False
+    if not there:
+        raise SceneError(f"there is no scene file {shown}")
     whole = path.absolute()
     try:
         with _neighbours(whole.parent):
@@ -44,7 +50,7 @@ def load_file(path: Path) -> Scene:
     except (KeyboardInterrupt, MemoryError):
         raise
     except BaseException as error:  # a user's file may raise anything, or exit
-        raise SceneError(f"scene file '{path}'{_blame(whole, error)}") from error
+        raise SceneError(f"scene file {shown}{_blame(whole, error)}") from error
 
 
 def _run(path: Path) -> Any:
@@ -61,7 +67,8 @@ def _run(path: Path) -> Any:
 @contextmanager
 def _neighbours(folder: Path) -> Iterator[None]:
     """The files of a folder can be imported."""
-    path, modules, here = list(sys.path), set(sys.modules), _working_directory()
+    path, modules, here = sys.path, set(sys.modules), _working_directory()
+    searched = list(path)
     no_bytecode = sys.dont_write_bytecode
     sys.path.append(str(folder))
     sys.dont_write_bytecode = True  # no __pycache__ in a folder that is the user's
@@ -70,7 +77,8 @@ def _neighbours(folder: Path) -> Iterator[None]:
         yield
     finally:
         sys.dont_write_bytecode = no_bytecode
-        sys.path[:] = path
+        sys.path = path  # the same list, if the file put another in its place
+        path[:] = searched
         for name in set(sys.modules) - modules:
             if name == _MODULE or _lies_in(sys.modules[name], folder):
                 del sys.modules[name]
@@ -137,7 +145,7 @@ def _blame(path: Path, error: BaseException) -> str:
             if Path(entry.filename) == path:
                 line = entry.lineno
         cause = cause.__cause__
-    what = str(error) if isinstance(error, SceneError) else f"{type(error).__name__}: {error}"
+    what = str(error) if isinstance(error, SceneError) else validity.said(error)
     where = f", line {line}" if line else ""
     return f"{where}: {' '.join(what.split())}{_shadowed(path.parent, error)}"
 

@@ -37,6 +37,8 @@ _OF_A_TEXTURE = frozenset(("bitmap", "color0", "color1", "value"))  # as its pro
 PLACEMENTS = ("uv_from_surface", "to_uv")
 _DEEPEST = 16
 LARGEST = 1e30  # Mitsuba computes in float32, where 1e39 is infinite
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = 200
 _ROUNDING = 1e-6
 _RIGID = 1e-4  # a matrix written with four decimals still passes; it moves no pixel by a tenth
 
@@ -59,7 +61,15 @@ def brief(value: object) -> str:
     """A value for a message: short, on one line."""
     if isinstance(value, np.ndarray):
         return f"an array of shape {value.shape} and type {value.dtype}"
-    return " ".join(reprlib.repr(value).split())
+    return " ".join(_SHORT.repr(value).split())
+
+
+def said(error: BaseException) -> str:
+    """An error of an author's code, its kind and its text, on one line."""
+    try:
+        return f"{type(error).__name__}: {' '.join(str(error).split())}"
+    except Exception:  # its text is the author's code too
+        return type(error).__name__
 
 
 def number(value: Any, what: str, bounds: Bounds = ANY) -> float:
@@ -73,13 +83,13 @@ def number(value: Any, what: str, bounds: Bounds = ANY) -> float:
 
 def whole(value: Any, what: str, least: int, most: int) -> int:
     """A whole number from `least` to `most`, as an int."""
-    if (isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real)
-            or not _float(value).is_integer()):
+    found = _float(value) if isinstance(value, numbers.Real) else math.nan
+    if isinstance(value, bool | np.bool_) or not found.is_integer():
         raise SceneError(f"{what} = {brief(value)}: use a whole number from {least} to {most}")
-    if not least <= value <= most:
-        raise SceneError(f"{what} = {brief(value)}: use {least} or more" if value < least else
+    if not least <= found <= most:
+        raise SceneError(f"{what} = {brief(value)}: use {least} or more" if found < least else
                          f"{what} = {brief(value)}: use at most {most}")
-    return int(_float(value))
+    return int(found)
 
 
 def text(value: Any, what: str, longest: int) -> str:

@@ -190,7 +190,7 @@ def test_names_in_a_manifest_are_no_paths(tmp_path):
 @pytest.mark.parametrize("name", ["../x", "a/b", "", "/x", "a\nb"])
 def test_a_scene_whose_name_is_a_path_is_refused(scene_file, name):
     scene_file.write_text(SCENE.replace('"mine"', repr(name)))
-    with pytest.raises(SceneError, match="the scene's name is|the name of a scene is"):
+    with pytest.raises(SceneError, match=r"the scene's name is|the name of a scene is"):
         catalog.load(str(scene_file))
 
 

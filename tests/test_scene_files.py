@@ -87,13 +87,64 @@ TAKEN = ("render", "scenes", "denoise", "onespp", "numpy", "mitsuba", "drjit", "
 def test_neighbours_with_names_of_the_library_take_nothing_from_it(tmp_path):
     """A whole render, in a process of its own, whose first imports come after the scene's."""
     mine = write(tmp_path, mine="import secrets, wave\n" + FILE, parts="COLOR = (0.1, 0, 0)",
-                 **{name: "raise RuntimeError('the wrong one')" for name in TAKEN})
+                 **dict.fromkeys(TAKEN, "raise RuntimeError('the wrong one')"))
     program = ("import sys; sys.path[:] = [p for p in sys.path if p]; import onespp; "
                f"sys.argv = ['onespp', 'render', {mine!r}, '--out', {str(tmp_path / 'out')!r}]; "
                "onespp.main()")
     done = subprocess.run([sys.executable, "-c", program], text=True, capture_output=True,
                           timeout=120, check=False)
     assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out/frames/0001.exr").is_file()
+
+
+def test_a_file_that_replaces_the_search_path_leaves_the_librarys(tmp_path):
+    path, entries = sys.path, list(sys.path)
+    load(write(tmp_path, parts="COLOR = (0, 0, 0)",
+               mine=FILE + f"import sys\nsys.path = [{str(tmp_path)!r}]\n"))
+    assert sys.path is path
+    assert sys.path == entries
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("class E(Exception):\n    def __str__(self): return 1 / 0\nraise E()", "line 3: E"),
+    ("class E(BaseException): pass\nraise E('x')", "line 2: E: x"),
+    ("def scene(): return scene()", "RecursionError"),
+    ("(" * 1000, "SyntaxError"),
+])
+def test_what_a_file_raises_is_one_sentence(tmp_path, text, words):
+    with pytest.raises(SceneError, match=words) as caught:
+        load(write(tmp_path, mine=text))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["a\nb.py", "x" * 300 + ".py", "a\0.py", "\udcff.py"])
+def test_a_path_that_no_file_can_have_is_one_sentence(name):
+    with pytest.raises(SceneError, match="no scene file") as caught:
+        load(name)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    (["--frames", ""], "'' are not frames"), (["--size", ""], "'' is not understood"),
+    (["--reference-spp", 10**30], "use at most"), (["--threads", 100000], "--threads is 100000"),
+    (["--frames", "4:7"], "in frame 5 raises ZeroDivisionError")])
+def test_options_that_cannot_be_are_one_sentence(tmp_path, call, options, words):
+    mine = write(tmp_path, parts="COLOR = (0, 0, 0)", mine=FILE.replace(
+        "diffuse(COLOR))", "diffuse(COLOR), lambda frame: look_at((1 / (frame - 5), 0, 0), "
+        "(0, 0, -9)))"))
+    code, _, error = call("render", mine, "--out", tmp_path / "out", *options)
+    assert code == 2
+    assert words in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out/manifest.json").exists()
+
+
+def test_overwriting_by_a_scene_that_cannot_be_built_loses_nothing(tmp_path, call):
+    mine = write(tmp_path, parts="COLOR = (0.5, 0, 0)", mine=FILE)
+    options = ("render", mine, "--out", tmp_path / "out", "--channels", "color", "--overwrite")
+    assert call(*options)[0] == 0
+    write(tmp_path, mine=FILE.replace("material or", '{"type": "difuse"} or'))
+    assert call(*options)[0] == 2
     assert (tmp_path / "out/frames/0001.exr").is_file()
 
 

@@ -313,8 +313,9 @@ def test_values_in_image_files_are_checked_too(tmp_path):
     (lambda: scene(max_depth=0), ["max_depth = 0", "1 or more"]),
     (lambda: scene(max_depth=10**400), ["max_depth"]),
     (lambda: scene(max_depth=2.5), ["max_depth = 2.5", "whole"]),
-    (lambda: scene(fps="24"), ["fps = '24'"]),
+    (lambda: scene(fps="24"), ["fps", "'24'"]),
     (lambda: scene(fps=float("nan")), ["fps"]),
+    (lambda: scene(fps=0.5), ["fps = 0.5"]),
     (lambda: Camera(EYE, "40"), ["field of view"]),
     (lambda: Camera(EYE, 180), ["180"]),
 ])
@@ -343,6 +344,16 @@ def test_a_camera_that_does_more_than_turn_and_move_is_refused(change, words):
     refused(lambda: Camera(EYE @ change), "'camera'", *words)
     refused(lambda: Camera(lambda frame: EYE @ change).world_from_camera_at(3),
             "'camera' in frame 3", *words)
+
+
+@pytest.mark.parametrize("geometry", [Sphere(), Cylinder()])
+def test_a_sheared_sphere_or_tube_is_refused(geometry):
+    """With axes of one length: Mitsuba warns, and renders something else."""
+    shear = np.eye(4)
+    shear[:3, 1] = np.array([0.7, 1, 0]) / np.hypot(0.7, 1)
+    made = Scene("t", "t", (Shape("x", geometry, GRAY, shear),), Camera(EYE), 2, 8, 6,
+                 environment=1)
+    refused(lambda: Stage(made), "'x'", "shears")
 
 
 def test_a_camera_with_rounded_numbers_is_taken():
