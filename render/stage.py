@@ -67,7 +67,7 @@ class Stage:
                 self._place(shape, shape.world_from_object_at(frame))
             if callable(shape.emission):
                 key = f"{shape.name}.emitter.radiance.value"
-                self._parameters[key] = mi.Color3f(shape.emission_at(frame))
+                self._parameters[key] = dr.opaque(mi.Color3f, shape.emission_at(frame))
         self._parameters.update()
         self.frame = frame
 
@@ -162,6 +162,7 @@ class Stage:
                 self._parameters[f"{shape.name}.{key}"] = value
         else:
             to_world = mi.Transform4f(_checked(shape, local).tolist())
+            dr.make_opaque(to_world)  # else what a shape derives of it is literals in the kernel
             self._parameters[f"{shape.name}.to_world"] = to_world
 
     def _registry_table(self) -> mi.UInt32:
