@@ -71,9 +71,10 @@ _ROWS = (
     Channel("roughness", ("roughness",), True, 1.0,
             "GGX alpha of the surface's glossy lobe; 0: a mirror, 1: no such lobe"),
     Channel("replay", ("replay.direct", "replay.indirect"), False, -1.0,
-            "luminance of some of the last frame's samples, shaded again here; -1: no sample"),
+            "luminance of some samples of the frame one number before (in the sequence or not), "
+            "shaded again here; -1: no sample"),
     Channel("replay_before", ("before.direct", "before.indirect"), False, -1.0,
-            "luminance that the same samples had in the last frame; -1: no sample"),
+            "luminance that the same samples had in that frame; -1: no sample"),
     Channel("albedo", _rgb("albedo"), True, 0.0,
             "diffuse reflectance in [0, 1]; 1 where the surface has no diffuse part"),
     Channel("normal", ("N.X", "N.Y", "N.Z"), False, 0.0,

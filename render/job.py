@@ -104,9 +104,9 @@ def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
                   "sceneFingerprint": sequence.manifest.fingerprint, "seed": str(job.seed),
                   "maxDepth": str(job.scene.max_depth), "direct": job.direct,
                   "sampler": job.sampler}
-    for done, (previous, index) in enumerate(zip([None, *job.frames], job.frames), 1):
+    for done, index in enumerate(job.frames, 1):
         if not sequence.frame_is_whole(index):
-            frame = job.renderer.frame(index, job.seed, job.channel_names(), previous)
+            frame = job.renderer.frame(index, job.seed, job.channel_names())
             sequence.write_frame(frame, provenance | {"frame": str(index), "spp": "1"})
         on_frames(done, "")
     if job.reference_spp is not None:

@@ -1,4 +1,4 @@
-"""A scene is compiled once: whatever moves or changes in it, later frames run the first's kernels."""
+"""A scene is compiled once: whatever moves or changes, later frames run the first ones' kernels."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ EMISSIONS = {"dark": None, "lit": (3.0, 2.0, 1.0), "changing": lambda f: (3.0 + 
 
 
 def scene_with(geometry, emission, moves: bool) -> Scene:
-    """A floor and a light that stand still, one thing, and a camera that moves if the thing does."""
+    """A floor and a light that stand still, a thing, and a camera that moves if it does."""
     def place(f):
-        return translate((0.1 * f, 0.8, 0.2)) @ rotate((0, 1, 0), 7 * f + 3) @ scale(0.4 + 0.01 * f)
+        return (translate((0.1 * f, 0.8, 0.2)) @ rotate((0, 1, 0), 7 * f + 3)
+                @ scale(0.4 + 0.01 * f))
 
     def view(f):
         return look_at((0.1 * f, 2, 5), (0, 0.4, 0))
