@@ -65,8 +65,9 @@ Name = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f
 class Manifest(JsonFile):
     """What a sequence is, in `manifest.json`.
 
-    `reference_spp` is None where there is no reference; `reference_filter` is "centre" where its
-    samples go through pixel centres, as a frame's do, "box" where they are spread over the pixel.
+    `reference_spp` is the fewest samples that a reference has (while they are rendered: is to
+    have), None where there is none; `reference_filter` is "centre" where samples go through pixel
+    centres, as a frame's do, "box" where they are spread over the pixel.
     `seed` and `max_depth` are None for imports, where they are not known. `objects` are names
     in order of ID. `fingerprint` is a hash of what the scene describes (or an import holds), so
     that an edited scene is not taken for the old one. `commands` are the command lines that made

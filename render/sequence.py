@@ -166,6 +166,16 @@ class Sequence:
         """Samples a pixel of a frame's reference."""
         return self._spp(self._path("reference", i))
 
+    def with_reference_spp(self) -> Sequence:
+        """The same with its manifest's `reference_spp` as its references have it now."""
+        fewest = min((self.reference_spp(i) for i in self.frames if self.has_reference(i)),
+                     default=None)
+        if fewest == self.manifest.reference_spp:
+            return self
+        manifest = self.manifest.model_copy(update={"reference_spp": fewest})
+        write_text(self.folder / "manifest.json", format_json(manifest))
+        return Sequence(self.folder, manifest)
+
     def read_reference(self, i: int) -> Reference:
         path = self._path("reference", i)
         images = self._read(path, ("color", "variance"))
