@@ -69,7 +69,7 @@ _ROWS = (
     Channel("hit_id", ("hit.ID",), False, -1.0,
             "object ID of what the path met next; -1: nothing"),
     Channel("roughness", ("roughness",), True, 1.0,
-            "GGX alpha of the surface's glossy lobe; 0: a mirror, 1: no such lobe"),
+            "GGX alpha of the surface's glossy lobe; 0: a mirror or a hole, 1: no such lobe"),
     Channel("replay", ("replay.direct", "replay.indirect"), False, -1.0,
             "luminance of some samples of the frame one number before (in the sequence or not), "
             "shaded again here; -1: no sample"),
@@ -78,7 +78,8 @@ _ROWS = (
     Channel("albedo", _rgb("albedo"), True, 0.0,
             "diffuse reflectance in [0, 1]; 1 where the surface has no diffuse part"),
     Channel("normal", ("N.X", "N.Y", "N.Z"), False, 0.0,
-            "shading normal, world space, unit length, facing the camera"),
+            "shading normal, normal and bump maps included, world space, unit length, facing the "
+            "camera"),
     Channel("position", ("P.X", "P.Y", "P.Z"), False, 0.0,
             "first hit, world space, scene units (float32: see `depth` far from the origin)"),
     Channel("depth", ("Z",), False, 0.0,

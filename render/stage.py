@@ -13,6 +13,7 @@ Traps that this file exists for:
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any, cast
 
 import drjit as dr
@@ -20,6 +21,7 @@ import numpy as np
 
 from scenes.description import Cylinder, Disk, Mesh, Rectangle, Scene, SceneError, Shape, Sphere
 
+from .appearance import Appearance
 from .variant import mi
 
 _SMALL = 0.125   # a scene that reaches less far has a unit of its own
@@ -96,9 +98,14 @@ class Stage:
         number = dr.gather(mi.UInt32, self.id_from_registry, registry_index, valid)
         return dr.select(valid, mi.Int32(number), -1)
 
+    @cached_property
+    def appearance(self) -> Appearance:
+        """What its materials say of themselves."""
+        return Appearance({_registry_index(s): s.bsdf() for s in self.mi_scene.shapes()})
+
     @property
     def glossy(self) -> bool:
-        """Whether any material reflects otherwise than diffusely."""
+        """Whether any material reflects otherwise than diffusely, or lets light pass straight."""
         return any(mi.has_flag(shape.bsdf().flags(), lobe) for shape in self.mi_scene.shapes()
                    for lobe in (mi.BSDFFlags.Glossy, mi.BSDFFlags.Delta))
 
