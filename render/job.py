@@ -12,16 +12,17 @@ from pathlib import Path
 import numpy as np
 
 from scenes.description import Scene
-from scenes.fingerprint import fingerprint
+from scenes.fingerprint import fingerprint, later_fingerprints
 
 from . import backend
 from .errors import InputError
 from .json_file import checked
 from .machine import machine
-from .manifest import Manifest
+from .manifest import Manifest, first_difference
 from .reference import Progress, pass_sizes, render_reference
 from .renderer import Renderer
 from .sequence import Sequence as FrameSequence
+from .sequence import another
 from .versions import versions
 
 SECONDS_BETWEEN_SAVES = 10.0
@@ -75,7 +76,8 @@ class RenderJob:
         return checked(
             Manifest, "the sequence",
             scene=self.scene.name, about=self.scene.about, fingerprint=fingerprint(self.scene),
-            frames=tuple(self.frames), width=self.width, height=self.height, fps=self.scene.fps,
+            later=later_fingerprints(self.scene, self.frames), frames=tuple(self.frames),
+            width=self.width, height=self.height, fps=self.scene.fps,
             seed=self.seed, reference_spp=self.reference_spp, max_depth=self.scene.max_depth,
             direct=self.direct, sampler=self.sampler,
             reference_filter="box" if self.antialias else "centre",
@@ -101,7 +103,10 @@ def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
     """
     if job.reference_spp is not None:
         pass_sizes(job.reference_spp)
-    sequence = FrameSequence.create(folder, job.manifest(), overwrite)
+    manifest = job.manifest()
+    if not overwrite:
+        _check_later_frames(job, folder, manifest)
+    sequence = FrameSequence.create(folder, manifest, overwrite)
     provenance = {"software": f"onespp {versions()['onespp']}", "scene": job.scene.name,
                   "sceneFingerprint": sequence.manifest.fingerprint, "seed": str(job.seed),
                   "maxDepth": str(job.scene.max_depth), "direct": job.direct,
@@ -119,6 +124,24 @@ def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
             on_references(done + 1, "")
         sequence = sequence.with_reference_spp()
     return sequence
+
+
+def _check_later_frames(job: RenderJob, folder: Path, manifest: Manifest) -> None:
+    """InputError if the folder's frames after the scene's last one are of another scene.
+
+    The scene's fingerprint ends with its last frame, but any frame can be asked for.
+    """
+    if not (folder / "manifest.json").exists():
+        return
+    there = FrameSequence.open(folder)
+    if first_difference(there.manifest, manifest) is not None:
+        return  # said by those who continue it
+    made = [i for i in there.frames if there.has_frame(i) or there.has_reference(i)
+            or there.has_partial(i)]
+    for i, expected in later_fingerprints(job.scene, made).items():
+        if there.manifest.later.get(i) != expected:
+            raise InputError(another(folder, "content", f" (what frame {i} was made from has "
+                                     "changed)"))
 
 
 def kept_references(sequence: FrameSequence, frames: Sequence[int], spp: int) -> str:

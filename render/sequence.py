@@ -188,6 +188,9 @@ class Sequence:
                     {"color": reference.color, "variance": reference.variance},
                     {**(provenance or {}), "spp": str(reference.spp)})
 
+    def has_partial(self, i: int) -> bool:
+        return self._path("reference", i, "partial.npz").exists()
+
     def read_partial(self, i: int) -> dict[str, np.ndarray] | None:
         """State of an unfinished reference, None where there is none."""
         path = self._path("reference", i, "partial.npz")
@@ -294,6 +297,12 @@ def object_ids(path: Path, image: np.ndarray, count: int) -> np.ndarray:
     return image.astype(np.int32)
 
 
+def another(folder: Path, what: str, detail: str) -> str:
+    """Why a folder's sequence cannot be continued: one sentence."""
+    return (f"{folder} holds a sequence with another {what}{detail}: use --overwrite to replace "
+            "it, or another --out")
+
+
 def _joined(planes: list[np.ndarray]) -> np.ndarray:
     """(h, w) or (h, w, c) float32 of one channel's planes."""
     if len(planes) == 1:
@@ -311,11 +320,11 @@ def _continued(folder: Path, old: Manifest, new: Manifest) -> Manifest:
         detail = f" ({a} there, {b} here)" if len(f"{a}{b}") < 100 else ""
         if key == "fingerprint":
             key, detail = "content", " (what it was made from has changed)"
-        raise InputError(f"{folder} holds a sequence with another {key}{detail}: use --overwrite "
-                         "to replace it, or another --out")
+        raise InputError(another(folder, key, detail))
     frames = tuple(sorted({*old.frames, *new.frames}))
     with_references = old if new.reference_spp is None else new
     return old.model_copy(update={
-        "frames": frames, "reference_spp": with_references.reference_spp,
+        "frames": frames, "later": old.later | new.later,
+        "reference_spp": with_references.reference_spp,
         "commands": tuple(dict.fromkeys((*old.commands, *new.commands))),
         "reference_filter": with_references.reference_filter})
