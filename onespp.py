@@ -80,7 +80,7 @@ def _judge_hard(name: str, out: Path, reference_spp: int, advance: Callable[[flo
     """Rows of one hard scene; `advance` is told the share that is done."""
     from denoise.hard import judge
     from denoise.methods import METHODS
-    from render.job import RenderJob, render_sequence
+    from render.job import RenderJob, kept_references, render_sequence
     from scenes.hard import HARD
 
     hard = HARD[name]
@@ -91,6 +91,8 @@ def _judge_hard(name: str, out: Path, reference_spp: int, advance: Callable[[flo
     job = replace(job, channels=tuple(dict.fromkeys((*job.channel_names(), *sorted(needed)))))
     sequence = render_sequence(job, out / name, on_references=lambda done, _: advance(
         0.5 * done / scene.frames))
+    if kept := kept_references(sequence, sequence.frames, reference_spp):
+        click.echo(f"{name}: {kept}", err=True)
     judged = iter(range(1, len(METHODS) + 2))
     return judge(sequence, name, hard.event, hard.diffuse,
                  lambda: advance(0.5 + 0.5 * next(judged) / (len(METHODS) + 1)))

@@ -46,7 +46,8 @@ def render_options(command):
         click.option("--seed", default=0, show_default=True, metavar="N",
                      help="Seed of all random numbers."),
         click.option("--reference-spp", type=int, metavar="N",
-                     help="Also render ground truth with N samples a pixel."),
+                     help="Also render ground truth with N samples a pixel; what is there "
+                          "with more is kept."),
         click.option("--antialias", is_flag=True,
                      help="Box-filter the reference over each pixel instead of its centre."),
         click.option("--channels", metavar="NAMES",
@@ -95,7 +96,7 @@ def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: st
         raise InputError(f"--seed is {seed}: use 0 or more")
     require_memory(height, width)
     names, added = _channel_names(channels)
-    from .job import RenderJob, render_sequence  # imports Mitsuba
+    from .job import RenderJob, kept_references, render_sequence  # imports Mitsuba
 
     job = RenderJob(scene, numbers, height, width, seed, reference_spp, antialias, names,
                     direct, sampler, command_line(), added)
@@ -103,8 +104,11 @@ def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: st
     with writing(out, "render", alone=overwrite), progress() as begin:
         rendering = begin(f"render {scene.name} {width}x{height}", len(numbers))
         refining = begin(f"reference, {reference_spp} spp", len(numbers)) if reference_spp else None
-        return render_sequence(job, out, overwrite=overwrite, on_frames=rendering.advance,
-                               on_references=refining.advance if refining else _ignore)
+        sequence = render_sequence(job, out, overwrite=overwrite, on_frames=rendering.advance,
+                                   on_references=refining.advance if refining else _ignore)
+    if reference_spp and (kept := kept_references(sequence, numbers, reference_spp)):
+        click.echo(kept)
+    return sequence
 
 
 def _ignore(done: float, note: str) -> None:

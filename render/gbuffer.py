@@ -37,10 +37,7 @@ def albedo(hit: PrimaryHit) -> mi.Color3f:
 
 def normal(hit: PrimaryHit) -> mi.Vector3f:
     """Shading normal, turned to the side that the camera sees (by the geometric normal)."""
-    si = hit.si
-    seen_from_behind = dr.dot(si.n, si.to_world(si.wi)) < 0
-    n = dr.select(seen_from_behind, -si.sh_frame.n, si.sh_frame.n)
-    return dr.select(si.is_valid(), n, 0)
+    return hit.stage.appearance.normal(hit.si)
 
 
 def position(hit: PrimaryHit) -> mi.Vector3f:
@@ -58,23 +55,7 @@ def object_id(hit: PrimaryHit) -> mi.Int32:
 
 
 def roughness(hit: PrimaryHit) -> mi.Float:
-    """GGX alpha of the glossy lobe, from its density alone, so for any BSDF that has one.
-
-    Along the normal, the density of the mirror direction is D / 4 = 1 / (4 pi alpha^2) for
-    microfacets sampled by visible normals (Walter et al. 2007; exact for GGX and Beckmann).
-    """
-    bsdf = hit.si.bsdf()
-    flags = bsdf.flags()
-    along = mi.Vector3f(0, 0, 1)
-    si = mi.SurfaceInteraction3f(hit.si)
-    si.wi = along
-    glossy = hit.si.is_valid() & mi.has_flag(flags, mi.BSDFFlags.Glossy)
-    context = mi.BSDFContext()
-    context.type_mask = mi.BSDFFlags.Glossy
-    density = bsdf.pdf(context, si, along, glossy)
-    alpha = dr.clip(dr.rsqrt(dr.maximum(4 * dr.pi * density, 1)), 0, 1)
-    mirror = hit.si.is_valid() & mi.has_flag(flags, mi.BSDFFlags.Delta)
-    return dr.select(mirror, 0, dr.select(glossy, alpha, 1))
+    return hit.stage.appearance.roughness(hit.si)
 
 
 GBUFFER: dict[str, Callable[[PrimaryHit], mi.Float | mi.Vector3f | mi.Color3f | mi.Int32]] = {

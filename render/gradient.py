@@ -5,8 +5,9 @@ with its object, and the camera of this frame looks at it with the random number
 had in the last frame. What then differs from the last frame's radiance is a change of shading, not
 noise: in a scene in which nothing changes it is exactly 0.
 
-Both radiances are traced here, the last frame's too, so that any frame can be rendered alone: two
-paths for every nine pixels, beside the one path a pixel of the frame.
+The last frame is the one numbered one less, whether or not a sequence has it. Both radiances are
+traced here, that frame's too, so that any frame can be rendered alone: two paths for every nine
+pixels, beside the one path a pixel of the frame.
 
 Source: Schied et al. 2018, "Gradient estimation for real-time adaptive temporal filtering"
 (A-SVGF). Differs: the paper shades the old sample in place of one of this frame's; here it is one

@@ -12,19 +12,22 @@ from pathlib import Path
 import numpy as np
 
 from scenes.description import Scene
-from scenes.fingerprint import fingerprint
+from scenes.fingerprint import fingerprint, later_fingerprints
 
 from . import backend
 from .errors import InputError
 from .json_file import checked
 from .machine import machine
-from .manifest import Manifest
+from .manifest import Manifest, first_difference
 from .reference import Progress, pass_sizes, render_reference
 from .renderer import Renderer
 from .sequence import Sequence as FrameSequence
+from .sequence import another
 from .versions import versions
 
 SECONDS_BETWEEN_SAVES = 10.0
+
+_MOST_SPP = 1 << 22  # of another job's progress: a damaged file may claim anything
 
 _SAVED = {"total", "squares", "passes", "samples", "spp", "antialias"}
 
@@ -73,7 +76,8 @@ class RenderJob:
         return checked(
             Manifest, "the sequence",
             scene=self.scene.name, about=self.scene.about, fingerprint=fingerprint(self.scene),
-            frames=tuple(self.frames), width=self.width, height=self.height, fps=self.scene.fps,
+            later=later_fingerprints(self.scene, self.frames), frames=tuple(self.frames),
+            width=self.width, height=self.height, fps=self.scene.fps,
             seed=self.seed, reference_spp=self.reference_spp, max_depth=self.scene.max_depth,
             direct=self.direct, sampler=self.sampler,
             reference_filter="box" if self.antialias else "centre",
@@ -101,14 +105,17 @@ def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
         pass_sizes(job.reference_spp)
     job.scene.try_frames(job.frames)  # they may lie beyond those that the scene file was tried at
     _ = job.renderer  # a scene that can't be built replaces nothing
-    sequence = FrameSequence.create(folder, job.manifest(), overwrite)
+    manifest = job.manifest()
+    if not overwrite:
+        _check_later_frames(job, folder, manifest)
+    sequence = FrameSequence.create(folder, manifest, overwrite)
     provenance = {"software": f"onespp {versions()['onespp']}", "scene": job.scene.name,
                   "sceneFingerprint": sequence.manifest.fingerprint, "seed": str(job.seed),
                   "maxDepth": str(job.scene.max_depth), "direct": job.direct,
                   "sampler": job.sampler}
-    for done, (previous, index) in enumerate(zip([None, *job.frames], job.frames), 1):
+    for done, index in enumerate(job.frames, 1):
         if not sequence.frame_is_whole(index):
-            frame = job.renderer.frame(index, job.seed, job.channel_names(), previous)
+            frame = job.renderer.frame(index, job.seed, job.channel_names())
             sequence.write_frame(frame, provenance | {"frame": str(index), "spp": "1"})
         on_frames(done, "")
     if job.reference_spp is not None:
@@ -117,12 +124,44 @@ def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
                 _render_reference(job, sequence, index, provenance,
                                   lambda part, done=done: on_references(done + part, ""))
             on_references(done + 1, "")
+        sequence = sequence.with_reference_spp()
     return sequence
 
 
+def _check_later_frames(job: RenderJob, folder: Path, manifest: Manifest) -> None:
+    """InputError if the folder's frames after the scene's last one are of another scene.
+
+    The scene's fingerprint ends with its last frame, but any frame can be asked for.
+    """
+    if not (folder / "manifest.json").exists():
+        return
+    there = FrameSequence.open(folder)
+    if first_difference(there.manifest, manifest) is not None:
+        return  # said by those who continue it
+    made = [i for i in there.frames if there.has_frame(i) or there.has_reference(i)
+            or there.has_partial(i)]
+    for i, expected in later_fingerprints(job.scene, made).items():
+        if there.manifest.later.get(i) != expected:
+            raise InputError(another(folder, "content", f" (what frame {i} was made from has "
+                                     "changed)"))
+
+
+def kept_references(sequence: FrameSequence, frames: Sequence[int], spp: int) -> str:
+    """A sentence about references that have more samples than asked for; "" if there are none."""
+    better = [found for i in frames if (found := sequence.reference_spp(i)) > spp]
+    if not better:
+        return ""
+    fewest, most = min(better), max(better)
+    return (f"kept {len(better)} reference{'s' if len(better) > 1 else ''} of "
+            f"{fewest if fewest == most else f'{fewest} to {most}'} spp, better than the {spp} spp "
+            "asked for (--overwrite replaces them)")
+
+
 def _has_reference(sequence: FrameSequence, index: int, job: RenderJob) -> bool:
+    """Whether a frame has a reference as good as asked for, or better."""
+    spp = job.reference_spp or 0
     try:
-        return sequence.has_reference(index) and sequence.reference_spp(index) == job.reference_spp
+        return sequence.has_reference(index) and sequence.reference_spp(index) >= spp
     except InputError:  # damaged: it is made again
         return False
 
@@ -132,8 +171,10 @@ def _render_reference(job: RenderJob, sequence: FrameSequence, index: int,
     """One reference; its progress is kept on disk every few seconds and when interrupted."""
     spp = job.reference_spp
     assert spp is not None
-    progress = (_saved_progress(job, sequence, index) or _smaller_reference(job, sequence, index)
-                or Progress.start(job.height, job.width))
+    known = [progress for progress in (_saved_progress(job, sequence, index),
+                                       _smaller_reference(job, sequence, index)) if progress]
+    progress = max(known, key=lambda progress: progress.samples,
+                   default=Progress.start(job.height, job.width))
     saved = time.monotonic()
 
     def after_pass(progress: Progress) -> None:
@@ -144,11 +185,14 @@ def _render_reference(job: RenderJob, sequence: FrameSequence, index: int,
             saved = time.monotonic()
 
     try:
-        reference = render_reference(job.renderer, index, job.seed, spp,
-                                     antialias=job.antialias, progress=progress,
-                                     after_pass=after_pass)
+        if progress.samples < spp:
+            reference = render_reference(job.renderer, index, job.seed, spp,
+                                         antialias=job.antialias, progress=progress,
+                                         after_pass=after_pass)
+        else:  # what an interrupted run for more samples left is enough
+            reference = progress.reference()
     except KeyboardInterrupt:
-        if progress.passes and _fits(job, progress):
+        if progress.passes and _is_after_a_pass(progress, _sizes(job, spp)):
             _save_progress(job, sequence, index, progress)
         raise
     sequence.write_reference(index, reference, provenance | {
@@ -163,7 +207,7 @@ def _save_progress(job: RenderJob, sequence: FrameSequence, index: int, progress
 
 
 def _saved_progress(job: RenderJob, sequence: FrameSequence, index: int) -> Progress | None:
-    """Progress of an interrupted run of the same job, if there is any that fits."""
+    """Progress of an interrupted run, if this job can go on from it, or needs no more."""
     saved = sequence.read_partial(index)
     if saved is None or saved.keys() != _SAVED:
         return None
@@ -174,8 +218,11 @@ def _saved_progress(job: RenderJob, sequence: FrameSequence, index: int) -> Prog
         return None
     passes, samples, spp, antialias = map(int, counts)
     progress = Progress(*sums, passes, samples)
-    same = spp == job.reference_spp and antialias == job.antialias
-    return progress if same and _fits(job, progress) else None
+    if (antialias != job.antialias or not 2 <= spp <= max(_MOST_SPP, job.reference_spp or 0)
+            or not _is_after_a_pass(progress, _sizes(job, spp))):
+        return None
+    enough = samples >= (job.reference_spp or 0) and passes >= 2
+    return progress if enough or _begins(job, _sizes(job, spp)[:passes]) else None
 
 
 def _smaller_reference(job: RenderJob, sequence: FrameSequence, index: int) -> Progress | None:
@@ -186,13 +233,20 @@ def _smaller_reference(job: RenderJob, sequence: FrameSequence, index: int) -> P
         return None
     if smaller is None or not 2 <= smaller.spp < (job.reference_spp or 0):
         return None
-    passes = pass_sizes(smaller.spp, job.height * job.width)
-    sizes = pass_sizes(job.reference_spp or 0, job.height * job.width)
-    return Progress.of(smaller, len(passes)) if sizes[:len(passes)] == passes else None
+    passes = _sizes(job, smaller.spp)
+    return Progress.of(smaller, len(passes)) if _begins(job, passes) else None
 
 
-def _fits(job: RenderJob, progress: Progress) -> bool:
+def _sizes(job: RenderJob, spp: int | None) -> list[int]:
+    return pass_sizes(spp or 0, job.height * job.width)
+
+
+def _begins(job: RenderJob, sizes: list[int]) -> bool:
+    """Whether passes of these sizes are the first ones of the job's reference."""
+    return _sizes(job, job.reference_spp)[:len(sizes)] == sizes
+
+
+def _is_after_a_pass(progress: Progress, sizes: list[int]) -> bool:
     """Whether it is the state between two passes, and not one torn by an interrupt."""
-    sizes = pass_sizes(job.reference_spp or 0, job.height * job.width)
     return (0 <= progress.passes <= len(sizes)
             and progress.samples == sum(sizes[:progress.passes]))

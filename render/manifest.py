@@ -65,11 +65,13 @@ Name = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f
 class Manifest(JsonFile):
     """What a sequence is, in `manifest.json`.
 
-    `reference_spp` is None where there is no reference; `reference_filter` is "centre" where its
-    samples go through pixel centres, as a frame's do, "box" where they are spread over the pixel.
+    `reference_spp` is the fewest samples that a reference has (while they are rendered: is to
+    have), None where there is none; `reference_filter` is "centre" where samples go through pixel
+    centres, as a frame's do, "box" where they are spread over the pixel.
     `seed` and `max_depth` are None for imports, where they are not known. `objects` are names
     in order of ID. `fingerprint` is a hash of what the scene describes (or an import holds), so
-    that an edited scene is not taken for the old one. `commands` are the command lines that made
+    that an edited scene is not taken for the old one; `later` has hashes of frames after the
+    scene's last one, by their number. `commands` are the command lines that made
     it, as they were typed, in order; `machine` is that of the first.
     """
 
@@ -92,6 +94,7 @@ class Manifest(JsonFile):
     channels: Annotated[tuple[str, ...], Field(min_length=1)]
     objects: Annotated[tuple[Name, ...], Field(min_length=1)]
     fingerprint: str = ""
+    later: dict[int, str] = Field(default_factory=dict)
     device: str = ""
     versions: dict[str, str] = Field(default_factory=dict)
     created: str = ""

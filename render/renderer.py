@@ -70,17 +70,18 @@ class Renderer:
         """Whether direct light is split: paths of one segment have none."""
         return self.direct == "resampled" and self.scene.max_depth > 1
 
-    def frame(self, index: int, seed: int = 0, channels: Sequence[str] = FRAME,
-              previous: int | None = None) -> Frame:
+    def frame(self, index: int, seed: int = 0, channels: Sequence[str] = FRAME) -> Frame:
         """One frame at 1 spp: one kernel, only the channels asked for.
 
-        The result depends on (scene, index, seed, size) alone, and the channels of `gradient.py`
-        on `previous`, the frame before it (None: there is none).
+        The result depends on (scene, index, seed, size) alone, and never on which other frames
+        are rendered: the channels of `gradient.py` replay frame `index` - 1, whether or not it is
+        asked for, and frame 0 has nothing to replay.
         """
         if not self._splits and set(channels) & {*SPLIT, *SHADOW}:
             raise InputError(f"the channels {', '.join(SPLIT + SHADOW)} need --direct resampled "
                              "and a scene of max_depth 2 or more")
-        replayed = replay(self, index, previous, seed) if set(channels) & set(REPLAY) else {}
+        before = index - 1 if index > 0 else None
+        replayed = replay(self, index, before, seed) if set(channels) & set(REPLAY) else {}
         self.stage.pose(index)
         planes = self._trace_frame(index, seed, [c for c in channels if c not in REPLAY])
         dr.eval(planes)

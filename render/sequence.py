@@ -166,6 +166,16 @@ class Sequence:
         """Samples a pixel of a frame's reference."""
         return self._spp(self._path("reference", i))
 
+    def with_reference_spp(self) -> Sequence:
+        """The same with its manifest's `reference_spp` as its references have it now."""
+        fewest = min((self.reference_spp(i) for i in self.frames if self.has_reference(i)),
+                     default=None)
+        if fewest == self.manifest.reference_spp:
+            return self
+        manifest = self.manifest.model_copy(update={"reference_spp": fewest})
+        write_text(self.folder / "manifest.json", format_json(manifest))
+        return Sequence(self.folder, manifest)
+
     def read_reference(self, i: int) -> Reference:
         path = self._path("reference", i)
         images = self._read(path, ("color", "variance"))
@@ -177,6 +187,9 @@ class Sequence:
         self._write(self._path("reference", i),
                     {"color": reference.color, "variance": reference.variance},
                     {**(provenance or {}), "spp": str(reference.spp)})
+
+    def has_partial(self, i: int) -> bool:
+        return self._path("reference", i, "partial.npz").exists()
 
     def read_partial(self, i: int) -> dict[str, np.ndarray] | None:
         """State of an unfinished reference, None where there is none."""
@@ -284,6 +297,12 @@ def object_ids(path: Path, image: np.ndarray, count: int) -> np.ndarray:
     return image.astype(np.int32)
 
 
+def another(folder: Path, what: str, detail: str) -> str:
+    """Why a folder's sequence cannot be continued: one sentence."""
+    return (f"{folder} holds a sequence with another {what}{detail}: use --overwrite to replace "
+            "it, or another --out")
+
+
 def _joined(planes: list[np.ndarray]) -> np.ndarray:
     """(h, w) or (h, w, c) float32 of one channel's planes."""
     if len(planes) == 1:
@@ -301,11 +320,11 @@ def _continued(folder: Path, old: Manifest, new: Manifest) -> Manifest:
         detail = f" ({a} there, {b} here)" if len(f"{a}{b}") < 100 else ""
         if key == "fingerprint":
             key, detail = "content", " (what it was made from has changed)"
-        raise InputError(f"{folder} holds a sequence with another {key}{detail}: use --overwrite "
-                         "to replace it, or another --out")
+        raise InputError(another(folder, key, detail))
     frames = tuple(sorted({*old.frames, *new.frames}))
     with_references = old if new.reference_spp is None else new
     return old.model_copy(update={
-        "frames": frames, "reference_spp": with_references.reference_spp,
+        "frames": frames, "later": old.later | new.later,
+        "reference_spp": with_references.reference_spp,
         "commands": tuple(dict.fromkeys((*old.commands, *new.commands))),
         "reference_filter": with_references.reference_filter})

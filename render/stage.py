@@ -13,6 +13,7 @@ Traps that this file exists for:
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, cast
 
 import drjit as dr
@@ -21,6 +22,7 @@ import numpy as np
 from scenes.description import Cylinder, Disk, Mesh, Rectangle, Scene, SceneError, Shape, Sphere
 
 from . import plugins
+from .appearance import Appearance
 from .variant import mi
 
 _SMALL = 0.125   # a scene that reaches less far has a unit of its own
@@ -71,7 +73,7 @@ class Stage:
                 self._place(shape, shape.world_from_object_at(frame))
             if callable(shape.emission):
                 key = f"{self._ids[shape.name]}.emitter.radiance.value"
-                self._parameters[key] = mi.Color3f(shape.emission_at(frame))
+                self._parameters[key] = dr.opaque(mi.Color3f, shape.emission_at(frame))
         self._parameters.update()
         self.frame = frame
 
@@ -100,9 +102,14 @@ class Stage:
         number = dr.gather(mi.UInt32, self.id_from_registry, registry_index, valid)
         return dr.select(valid, mi.Int32(number), -1)
 
+    @cached_property
+    def appearance(self) -> Appearance:
+        """What its materials say of themselves."""
+        return Appearance({_registry_index(s): s.bsdf() for s in self.mi_scene.shapes()})
+
     @property
     def glossy(self) -> bool:
-        """Whether any material reflects otherwise than diffusely."""
+        """Whether any material reflects otherwise than diffusely, or lets light pass straight."""
         return any(mi.has_flag(shape.bsdf().flags(), lobe) for shape in self.mi_scene.shapes()
                    for lobe in (mi.BSDFFlags.Glossy, mi.BSDFFlags.Delta))
 
@@ -167,6 +174,7 @@ class Stage:
                 self._parameters[f"{self._ids[shape.name]}.{key}"] = value
         else:
             to_world = mi.Transform4f(_checked(shape, local).tolist())
+            dr.make_opaque(to_world)  # else what a shape derives of it is literals in the kernel
             self._parameters[f"{self._ids[shape.name]}.to_world"] = to_world
 
     def _registry_table(self) -> mi.UInt32:

@@ -1,7 +1,11 @@
 import numpy as np
 import pytest
+from small_sequence import contents
 
 from render.channels import FRAME, REPLAY
+from render.gradient import replay
+from render.job import RenderJob, render_sequence
+from render.manifest import parse_frames
 from render.renderer import Renderer
 from scenes.description import Camera, Rectangle, Scene, Shape, Sphere
 from scenes.transforms import look_at, rotate, scale, translate
@@ -25,9 +29,17 @@ def scene(moves=False, emission=(8.0, 8.0, 8.0), **changes) -> Scene:
     return Scene(**(parts | changes))
 
 
-def replayed(made, index=1, previous: int | None = 0, seed=0, **options):
-    frame = Renderer(made, HEIGHT, WIDTH, **options).frame(index, seed, (*FRAME, *REPLAY), previous)
+def replayed(made, index=1, seed=0, **options):
+    frame = Renderer(made, HEIGHT, WIDTH, **options).frame(index, seed, (*FRAME, *REPLAY))
     return frame, frame["replay"], frame["replay_before"], frame["replay"][..., 0] >= 0
+
+
+def replayed_from_the_first(made, index):
+    """The same of samples of frame 0, some frames before."""
+    renderer = Renderer(made, HEIGHT, WIDTH)
+    planes = replay(renderer, index, 0, seed=0)
+    return (renderer.frame(index), planes["replay"], planes["replay_before"],
+            planes["replay"][..., 0] >= 0)
 
 
 @pytest.mark.parametrize("options", [{}, {"direct": "resampled", "sampler": "zsobol"}])
@@ -69,7 +81,7 @@ def test_a_ball_that_moves_under_an_even_sky_does_not_change_its_shading():
 
 
 def test_a_shadow_that_moves_shows_where_it_was_and_is():
-    frame, now, before, seen = replayed(scene(moves=True), index=3)
+    frame, now, before, seen = replayed_from_the_first(scene(moves=True), 3)
     on_floor = seen & (frame["id"] == 1)
     change = np.abs(now - before)[..., 0]
     assert change[on_floor].max() > 0.1
@@ -80,7 +92,7 @@ def test_points_that_the_ball_hides_now_are_left_out():
     """What stands still and stays in view lands in its own pixel; only the ball's move on."""
     made = scene(moves=True)
     still = Renderer(made, HEIGHT, WIDTH).frame(0)
-    frame, _, _, seen = replayed(made, index=3)
+    frame, _, _, seen = replayed_from_the_first(made, 3)
     covered = (frame["id"] == 0) & (still["id"] != 0)
     assert covered.sum() > 20
     from_ball = (still["id"] == 0).sum() / 9
@@ -89,7 +101,7 @@ def test_points_that_the_ball_hides_now_are_left_out():
 
 def test_the_first_frame_has_none_and_others_do_not_change_by_it():
     made = scene(moves=True)
-    _, now, before, _ = replayed(made, index=0, previous=None)
+    _, now, before, _ = replayed(made, index=0)
     assert (now == -1).all()
     assert (before == -1).all()
     with_it, *_ = replayed(made)
@@ -102,11 +114,36 @@ def test_the_same_in_any_order_and_another_with_another_seed():
     made = scene(moves=True)
     renderer = Renderer(made, HEIGHT, WIDTH)
     renderer.frame(5)
-    late = renderer.frame(1, 0, REPLAY, 0)
-    _, now, before, _ = replayed(made)
-    np.testing.assert_allclose(late["replay"], now, rtol=1e-5)
-    np.testing.assert_allclose(late["replay_before"], before, rtol=1e-5)
+    late = renderer.frame(1, 0, (*FRAME, *REPLAY))
+    frame, now, _, _ = replayed(made)
+    for name in (*FRAME, *REPLAY):
+        np.testing.assert_array_equal(late[name], frame[name], err_msg=name)
     assert not np.array_equal(replayed(made, seed=1)[1], now)
+
+
+PIECES = {"one": ("0:6",), "halves": ("0:3", "3:6"), "every second": ("0:6:2", "0:6"),
+          "backwards": ("5", "4", "2:4", "0:2"), "the last alone": ("5", "0:6")}
+
+
+@pytest.fixture(scope="module")
+def in_pieces(tmp_path_factory):
+    """The same six frames, asked for in different pieces: contents of their files."""
+    made, found = scene(moves=True, emission=lambda f: (8.0 + f,) * 3), {}
+    for name, pieces in PIECES.items():
+        out = tmp_path_factory.mktemp("pieces") / "s"
+        for piece in pieces:
+            render_sequence(RenderJob(made, parse_frames(piece), 12, 15, reference_spp=4,
+                                      added=REPLAY), out)
+        found[name] = {file: data for file, data in contents(out).items()
+                       if file.endswith((".exr", ".npz")) or file.startswith("frames")}
+    return found
+
+
+@pytest.mark.parametrize("name", [name for name in PIECES if name != "one"])
+def test_a_frame_is_the_same_bytes_in_whichever_pieces_it_was_rendered(in_pieces, name):
+    assert len(in_pieces["one"]) == 18
+    assert in_pieces[name].keys() == in_pieces["one"].keys()
+    assert [f for f, data in in_pieces["one"].items() if in_pieces[name][f] != data] == []
 
 
 def test_the_command_adds_them(tmp_path, call):

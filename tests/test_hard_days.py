@@ -269,7 +269,7 @@ def test_a_pass_that_an_interrupt_tore_is_not_saved():
     task = job.RenderJob(catalog.load("box"), (0,), 4, 4, reference_spp=16)
     progress = Progress.start(4, 4)
     progress.add(np.ones((4, 4, 3)), 2)
-    assert job._fits(task, progress)
+    assert job._is_after_a_pass(progress, job._sizes(task, 16))
 
     class Torn(np.ndarray):
         def __mul__(self, other):
@@ -278,7 +278,7 @@ def test_a_pass_that_an_interrupt_tore_is_not_saved():
     with pytest.raises(KeyboardInterrupt):
         progress.add(np.ones((4, 4, 3)).view(Torn), 2)
     assert (progress.total.max(), progress.squares.max()) == (2.0, 0.5)  # torn indeed
-    assert not job._fits(task, progress)
+    assert not job._is_after_a_pass(progress, job._sizes(task, 16))
 
 
 # The environment

@@ -133,7 +133,7 @@ def rendered():
     """Three frames with a mirror, which have every channel there is."""
     renderer = Renderer(HARD["mirror"].make(), 16, 24, direct="resampled", sampler="zsobol")
     channels = (*renderer.channels, *REPLAY)
-    return [renderer.frame(i, channels=channels, previous=i - 1 if i else None) for i in range(3)]
+    return [renderer.frame(i, channels=channels) for i in range(3)]
 
 
 @each_method

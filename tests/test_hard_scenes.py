@@ -36,8 +36,7 @@ def rendered(name):
     """
     renderer = Renderer(HARD[name].make(), HEIGHT, WIDTH, direct="resampled", sampler="zsobol")
     channels = renderer.channels + (REPLAY if name in REPLAYED else ())
-    frames = [renderer.frame(i, channels=channels, previous=previous)
-              for previous, i in zip((None, *FRAMES), FRAMES)]
+    frames = [renderer.frame(i, channels=channels) for i in FRAMES]
     if name not in REPLAYED:
         nothing = np.full((HEIGHT, WIDTH, 2), -1.0)
         frames = [with_images(f, **dict.fromkeys(REPLAY, nothing)) for f in frames]
