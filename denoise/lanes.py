@@ -8,6 +8,7 @@ import numpy as np
 
 from render.frame import Frame
 
+from .debts import repay
 from .stencil import Float, Stencil
 from .surface import GUIDES, Surface, read_color, read_surface
 
@@ -34,7 +35,7 @@ class OnLanes:
         raise NotImplementedError
 
     def __call__(self, frame: Frame, state: Any) -> tuple[np.ndarray, Any]:
-        """(h, w, 3) denoised colour, and the state for the next frame.
+        """(h, w, 3) denoised colour, nowhere negative, and the state for the next frame.
 
         Raises:
             InputError: a channel is missing, the size is not the state's, or the frame has
@@ -42,7 +43,7 @@ class OnLanes:
         """
         color, surface = read_color(frame, state.stencil), read_surface(frame, state.stencil)
         result, after = self.on_lanes(frame, color, surface, state)
-        return state.stencil.image(result), after
+        return repay(state.stencil.image(result), frame["id"]), after
 
     def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
                  state: Any) -> tuple[list[Float], Any]:

@@ -90,7 +90,7 @@ class RemoveOutliers:
             color = color + (images[name] - given)
         if "specular" in images:
             images["indirect"] = images["indirect"] + images["specular"]
-        images["color"] = color
+        images["color"] = np.maximum(color, np.minimum(before, 0))  # a sum of rounded differences
         if "direct" in images and "visibility" in frame:  # what is cut off was never let through
             given, kept = (luminance(repair(np.asarray(image, np.float32), frame["id"]))
                            for image in (frame["direct"], images["direct"]))

@@ -285,4 +285,26 @@ def run(frames: list[Frame], m) -> np.ndarray:
             fade = np.clip(1 - (n - 1) / m.fade, 0, 1)
             out[name] = guided(frame, history, s2, levels, sigma, fade, narrow, m)
         length, previous = n, frame
-    return color_of(frames[-1], out)
+    return repaid(color_of(frames[-1], out), frames[-1]["id"])
+
+
+def repaid(image: np.ndarray, id_: np.ndarray) -> np.ndarray:
+    """Nothing below 0: what is, is taken from the pixels of the object around, then from it all."""
+    image, (h, w) = image.copy(), id_.shape
+    for i in range(7):
+        new, wealth = image.copy(), np.maximum(image, 0)
+        for y, x, c in np.argwhere(image < 0):
+            around = [(y + dy, x + dx) for dy, dx in ((-1 << i, 0), (0, -1 << i), (0, 1 << i),
+                                                      (1 << i, 0))
+                      if 0 <= y + dy < h and 0 <= x + dx < w and id_[y + dy, x + dx] == id_[y, x]]
+            asked = sum(wealth[place][c] for place in around)
+            rate = min(-image[y, x, c] / asked, 1 / 8) if asked else 0
+            new[y, x, c] += rate * asked
+            for place in around:
+                new[place][c] -= rate * wealth[place][c]
+        image = np.where(np.abs(new) < 1e-12, 0, new)
+    for i in np.unique(id_):
+        some = image[id_ == i]
+        debt, wealth = np.maximum(-some, 0).sum(0), np.maximum(some, 0).sum(0)
+        image[id_ == i] = np.maximum(some, 0) * np.maximum(1 - debt / np.maximum(wealth, 1e-30), 0)
+    return image
