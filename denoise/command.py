@@ -57,14 +57,14 @@ def denoise(context: click.Context, folder: Path, methods: tuple[str, ...],
 def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...] = (),
                name: str | None = None, outliers: float | None = None) -> None:
     """Do what the options of `denoise` ask."""
-    from .methods import build
+    from .methods import OUTLIERS, build
     from .stream import denoise_sequence
 
     sequence = Sequence.open(folder)
     chosen = _names(methods)
-    if name and len(chosen) > 1:
+    if name is not None and len(chosen) > 1:
         raise InputError(f"--name {name} is one name for {len(chosen)} methods: give one --method")
-    denoisers = {name or (method if outliers is None else f"{method}+outliers"):
+    denoisers = {method + (OUTLIERS if outliers is not None else "") if name is None else name:
                  build(method, pairs(settings), outliers) for method in chosen}
     for name, denoiser in denoisers.items():
         if set(REPLAY) & set(denoiser.needs) - set(sequence.manifest.channels):

@@ -32,7 +32,7 @@ from .errors import InputError
 from .exr import read_exr, read_header, write_exr
 from .frame import Frame
 from .json_file import checked
-from .manifest import Manifest, Run, check_name
+from .manifest import Manifest, Run, check_result_name
 from .sequence import Sequence, object_ids
 
 _RGB = ("R", "G", "B")
@@ -117,7 +117,7 @@ def import_result(sequence: Sequence, folder: Path | str, method: str) -> list[i
         InputError: no results, more of them than frames, or one that is damaged or of another size.
     """
     folder, frames = Path(folder), sequence.frames
-    check_name(method, "method")
+    check_result_name(method, sequence.methods())
     numbers = _numbers(folder, "result")
     if not numbers:
         raise InputError(f"{folder} has no result_0.exr, result_1.exr ...")
@@ -127,7 +127,7 @@ def import_result(sequence: Sequence, folder: Path | str, method: str) -> list[i
     for k in numbers:
         image = _image(folder / f"result_{k}.exr", _RGB, sequence.size)
         sequence.write_result(method, frames[k], image)
-    sequence.write_run(method, Run(method=method, parameters={"source": "games202 result files"}))
+    sequence.write_run(method, Run(method="files", parameters={"source": "games202 result files"}))
     return [frames[k] for k in numbers]
 
 

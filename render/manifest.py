@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, FiniteFloat, PlainSerializer, field_validator
@@ -126,8 +127,11 @@ def first_difference(a: Manifest, b: Manifest) -> str | None:
 
 
 class Run(JsonFile):
-    """How a denoised result came to be, in `denoised/METHOD/run.json`.
+    """How a denoised result came to be, in `denoised/NAME/run.json`.
 
+    `method` is what ran, whatever the results are called: a name of `onespp denoise --list`,
+    `external` (the program is in `parameters`) or `files` (results taken as they were).
+    `changed` are those of the `parameters` that are not the method's defaults.
     `ms` holds milliseconds by frame number, reading and writing of files excluded; `first_ms`
     the first call's, compilation included; `peak_mb` the most memory that the calls took, in MiB.
     `energy_kept` is the share of the input's mean radiance that outlier removal let through.
@@ -136,6 +140,7 @@ class Run(JsonFile):
 
     method: Name
     parameters: dict[str, Any] = Field(default_factory=dict)
+    changed: dict[str, Any] = Field(default_factory=dict)
     device: str = ""
     threads: int | None = None
     versions: dict[str, str] = Field(default_factory=dict)
@@ -145,6 +150,29 @@ class Run(JsonFile):
     ms: dict[int, FiniteFloat] = Field(default_factory=dict)
     peak_mb: FiniteFloat | None = None
     energy_kept: FiniteFloat | None = None
+
+
+RESERVED = MappingProxyType({
+    "input": "tables call the noisy frames so", "reference": "tables call the ground truth so",
+    "all": "`--method all` means every method", "oidn": "`--method oidn` means its qualities"})
+"""Names that results cannot have, and why."""
+
+
+def check_result_name(name: str, others: Iterable[str] = ()) -> str:
+    """A name for results; InputError if it is none, is taken by tables, or hides another one.
+
+    Args:
+        others: names of the results that are there. Some file systems cannot tell a name from
+            one in other letters, small or capital, so no two may differ in that alone.
+    """
+    check_name(name, "method")
+    if why := RESERVED.get(name.lower()):
+        raise InputError(f"{name!r} cannot be the name of results, since {why}: use another --name")
+    same = [other for other in others if other.lower() == name.lower() and other != name]
+    if same:
+        raise InputError(f"there are results called {same[0]!r}, which some file systems take for "
+                         f"{name!r}: use another --name")
+    return name
 
 
 def check_name(name: str, what: str) -> str:

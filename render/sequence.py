@@ -29,7 +29,7 @@ from .errors import InputError
 from .exr import read_exr, read_header, write_exr
 from .frame import Frame
 from .json_file import format_json, read_json
-from .manifest import Manifest, Run, check_name, first_difference
+from .manifest import Manifest, Run, check_result_name, first_difference
 from .matrices import format_matrices, read_matrices
 
 _HALF_MAX = float(np.finfo(np.float16).max)
@@ -240,7 +240,7 @@ class Sequence:
         return self.folder / kind / f"{i:04d}.{suffix}"
 
     def _result_folder(self, method: str) -> Path:
-        return self.folder / "denoised" / check_name(method, "method")
+        return self.folder / "denoised" / check_result_name(method)
 
     def _result(self, method: str, i: int) -> Path:
         return self._result_folder(method) / f"{i:04d}.exr"
