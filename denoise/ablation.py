@@ -116,9 +116,11 @@ def ablation(folders: tuple[Path, ...], method: str, device: str, threads: int |
             steps = begin(f"ablation of {method} on {folder.name}", len(sequence.frames))
             results[folder.name] = ablate(sequence, methods, steps.advance)
             m = sequence.manifest
+            made = "imported" if m.direct is None else (
+                f"seed {m.seed}, --direct {m.direct} --sampler {m.sampler}")
             notes.append(f"{folder.name}: {m.scene}, {len(m.frames)} frames of "
-                         f"{m.width}x{m.height}, seed {m.seed}, --direct {m.direct} "
-                         f"--sampler {m.sampler}, reference {m.reference_spp} spp")
+                         f"{m.width}x{m.height}, {made}, "
+                         f"reference {m.reference_spp or 'of unknown'} spp")
     click.echo(markdown(method, results))
     click.echo("\n" + "; ".join(notes) + f"; means over frames, PSNR on {TONE_MAP}.")
 

@@ -8,7 +8,15 @@ from itertools import pairwise
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, FiniteFloat, PlainSerializer, field_validator
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    PlainSerializer,
+    ValidationInfo,
+    field_validator,
+)
 
 from .channels import CHANNELS
 from .errors import InputError
@@ -63,16 +71,22 @@ Size = Annotated[int, Field(ge=1, le=1 << 16)]
 Name = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]+$")]
 
 
+_UNKNOWN = ("spp", "max_depth", "direct", "sampler", "reference_filter")  # of an import
+
+
 class Manifest(JsonFile):
     """What a sequence is, in `manifest.json`.
 
     `reference_spp` is None where there is no reference; `reference_filter` is "centre" where its
     samples go through pixel centres, as a frame's do, "box" where they are spread over the pixel.
-    `seed` and `max_depth` are None for imports, where they are not known. `objects` are names
-    in order of ID. `fingerprint` is a hash of what the scene describes (or an import holds), so
-    that an edited scene is not taken for the old one. `commands` are the command lines that made
-    it, as they were typed, in order; `machine` is that of the first.
+    `seed`, `spp`, `max_depth`, `direct`, `sampler` and `reference_filter` are None for imports,
+    where nobody knows them (older versions wrote defaults there, which are not read). `objects`
+    are names in order of ID. `fingerprint` is a hash of what the scene describes (or an import
+    holds), so that an edited scene is not taken for the old one. `commands` are the command lines
+    that made it, as they were typed, in order; `machine` is that of the first.
     """
+
+    model_config = ConfigDict(validate_default=True)
 
     format: Annotated[int, Field(ge=FORMAT, le=FORMAT)] = FORMAT
     source: Literal["render", "games202"] = "render"
@@ -84,12 +98,12 @@ class Manifest(JsonFile):
     height: Size
     fps: Annotated[FiniteFloat, Field(gt=0)] = 24.0
     seed: Annotated[int, Field(ge=0)] | None = 0
-    spp: Annotated[int, Field(ge=1)] = 1
+    spp: Annotated[int, Field(ge=1)] | None = 1
     reference_spp: Annotated[int, Field(ge=1)] | None = None
-    reference_filter: Literal["centre", "box"] = "centre"
+    reference_filter: Literal["centre", "box"] | None = "centre"
     max_depth: Annotated[int, Field(ge=1)] | None = None
-    direct: Name = "mis"
-    sampler: Name = "pcg"
+    direct: Name | None = "mis"
+    sampler: Name | None = "pcg"
     channels: Annotated[tuple[str, ...], Field(min_length=1)]
     objects: Annotated[tuple[Name, ...], Field(min_length=1)]
     fingerprint: str = ""
@@ -98,6 +112,11 @@ class Manifest(JsonFile):
     created: str = ""
     machine: str = ""
     commands: tuple[str, ...] = ()
+
+    @field_validator(*_UNKNOWN)
+    @classmethod
+    def _known_of_renders_only(cls, value: Any, info: ValidationInfo) -> Any:
+        return None if info.data.get("source") == "games202" else value
 
     @field_validator("channels")
     @classmethod
