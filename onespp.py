@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 import click
+from click.core import ParameterSource
 
 import render.command
 from denoise.bench_command import bench
@@ -109,13 +110,15 @@ def _within(steps: Steps, number: int, name: str, part: float) -> None:
 @click.option("--method", "methods", multiple=True, metavar="NAME", default=DEFAULT_METHODS,
               show_default=True, help="As for `denoise`; may be given several times.")
 @render.command.render_options
-def run(scene: str, out: Path | None, methods: tuple[str, ...], device: str, threads: int | None,
-        reference_spp: int | None, **options) -> None:
+@click.pass_context
+def run(context: click.Context, scene: str, out: Path | None, methods: tuple[str, ...],
+        device: str, threads: int | None, reference_spp: int | None, **options) -> None:
     """Render SCENE with ground truth, denoise it and score the result."""
     render.command.use(device, threads)
     spp = REFERENCE_SPP if reference_spp is None else reference_spp
     sequence = render.command.render_to(scene, out, reference_spp=spp, **options)
-    denoise_in(sequence.folder, methods)
+    default = context.get_parameter_source("methods") == ParameterSource.DEFAULT
+    denoise_in(sequence.folder, methods, default=default)
     score_in(sequence.folder)
 
 

@@ -6,11 +6,10 @@ default. Nothing is written: frames are denoised in memory, all variants side by
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from statistics import fmean
 from typing import Any
 
 import click
@@ -22,6 +21,7 @@ from render.terminal import progress, run
 
 from .ground import read_ground
 from .judge import Judge
+from .means import mean_over_frames
 from .methods import Method, build, channels_read, parameters
 from .stability import MEASURES
 from .tonemap import TONE_MAP
@@ -75,13 +75,10 @@ def ablate(sequence: Sequence, methods: dict[str, Method],
             image, states[name] = method(frame, states[name])
             judges[name].see(number, before.get(number), image, ground, None, COLUMNS[:2])
         on_frame(done + 1)
-    return [Variant(name, {c: _mean(row[c] for row in judge.rows) for c in COLUMNS})
+    return [Variant(name, {c: mean_over_frames(MEASURES[c], {row.frame: row[c]
+                                                            for row in judge.rows})
+                           for c in COLUMNS})
             for name, judge in judges.items()]
-
-
-def _mean(values: Iterator[float | None]) -> float | None:
-    known = [v for v in values if v is not None]
-    return fmean(known) if known else None
 
 
 def markdown(method: str, results: dict[str, list[Variant]]) -> str:
@@ -119,9 +116,11 @@ def ablation(folders: tuple[Path, ...], method: str, device: str, threads: int |
             steps = begin(f"ablation of {method} on {folder.name}", len(sequence.frames))
             results[folder.name] = ablate(sequence, methods, steps.advance)
             m = sequence.manifest
+            made = "imported" if m.direct is None else (
+                f"seed {m.seed}, --direct {m.direct} --sampler {m.sampler}")
             notes.append(f"{folder.name}: {m.scene}, {len(m.frames)} frames of "
-                         f"{m.width}x{m.height}, seed {m.seed}, --direct {m.direct} "
-                         f"--sampler {m.sampler}, reference {m.reference_spp} spp")
+                         f"{m.width}x{m.height}, {made}, "
+                         f"reference {m.reference_spp or 'of unknown'} spp")
     click.echo(markdown(method, results))
     click.echo("\n" + "; ".join(notes) + f"; means over frames, PSNR on {TONE_MAP}.")
 

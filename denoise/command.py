@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import click
 from click.core import ParameterSource
 
-from render.channels import REPLAY
+from render.channels import REPLAY, SPLIT
 from render.command import device_option, threads_option, use
 from render.errors import InputError
+from render.games202_files import gaps
 from render.lock import writing
 from render.sequence import Sequence
 from render.terminal import command_line, progress
@@ -18,6 +21,8 @@ from render.terminal import command_line, progress
 from .parameters import pairs
 
 DEFAULT_METHODS = ("onespp",)
+BETTER_ON_PLAIN = ("temporal-oidn", "oidn-high")
+"""Where frames have no visibility apart, as imported ones."""
 
 
 @click.command()
@@ -51,20 +56,22 @@ def denoise(context: click.Context, folder: Path, methods: tuple[str, ...],
             raise InputError("--external takes --name, and no --method, --set or --outliers")
         _denoise_externally(folder, external, name)
         return
-    denoise_in(folder, methods, settings, name, outliers)
+    default = context.get_parameter_source("methods") == ParameterSource.DEFAULT
+    denoise_in(folder, methods, settings, name, outliers, default)
 
 
 def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...] = (),
-               name: str | None = None, outliers: float | None = None) -> None:
-    """Do what the options of `denoise` ask."""
-    from .methods import build
+               name: str | None = None, outliers: float | None = None,
+               default: bool = False) -> None:
+    """Do what the options of `denoise` ask; `default`: nobody chose the methods."""
+    from .methods import OUTLIERS, build
     from .stream import denoise_sequence
 
     sequence = Sequence.open(folder)
     chosen = _names(methods)
-    if name and len(chosen) > 1:
+    if name is not None and len(chosen) > 1:
         raise InputError(f"--name {name} is one name for {len(chosen)} methods: give one --method")
-    denoisers = {name or (method if outliers is None else f"{method}+outliers"):
+    denoisers = {method + (OUTLIERS if outliers is not None else "") if name is None else name:
                  build(method, pairs(settings), outliers) for method in chosen}
     for name, denoiser in denoisers.items():
         if set(REPLAY) & set(denoiser.needs) - set(sequence.manifest.channels):
@@ -87,8 +94,32 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
     for name, run in runs.items():
         if run.energy_kept is not None:
             click.echo(f"{name}: removing outliers took {1 - run.energy_kept:.2%} of the energy")
+    for line in _what_to_know(sequence, default):
+        click.echo(line)
     click.echo(f"denoised {frames} frames by {', '.join(runs)} "
                f"into {sequence.folder / 'denoised'}")
+
+
+def _what_to_know(sequence: Sequence, default: bool) -> Iterator[str]:
+    """What a user may not know of these frames, a sentence each; `default`: of the method, too."""
+    if default and not set(SPLIT) <= set(sequence.manifest.channels):
+        from .peers import PEERS
+
+        install = "" if all(PEERS[name].available() for name in BETTER_ON_PLAIN) else (
+            ", with Open Image Denoise installed (pip install 'onespp[oidn]')")
+        yield (f"these frames lack {' and '.join(SPLIT)}, and without them the default method is "
+               f"not the best: try --method {' or '.join(BETTER_ON_PLAIN)}{install}")
+    for a, b in _gaps(sequence):
+        yield (f"there is no frame between {a} and {b}: methods with a history took {b} for the "
+               f"frame after {a}")
+
+
+def _gaps(sequence: Sequence) -> list[tuple[int, int]]:
+    """Neighbours between which frames are missing; a stride that was asked for misses none."""
+    there = [i for i in sequence.frames if sequence.has_frame(i)]
+    known = gaps(there) if sequence.manifest.source == "games202" else []
+    return [(a, b) for a, b in pairwise(there)
+            if (a, b) in known or any(a < i < b for i in sequence.frames)]
 
 
 def _denoise_externally(folder: Path, command: str, name: str) -> None:

@@ -28,6 +28,7 @@ from rich.table import Table
 from render.errors import InputError
 from render.json_file import JsonFile, format_json
 
+from .means import identical
 from .metrics import Metric
 from .scorecard import MethodScore, Scores
 from .stability import MEASURES
@@ -158,7 +159,11 @@ def _change(name: str, row: Metric, a: MethodScore, b: MethodScore,
 
 
 def _common(row: Metric, a: MethodScore, b: MethodScore) -> tuple[np.ndarray, np.ndarray]:
-    """The measure on the frames that both have it for, in order."""
+    """The measure on the frames that both have it for, in order.
+
+    Without those where one is identical to its reference (`means.py`), if there are others: the
+    infinite PSNR of an image that got a little better or worse would decide alone.
+    """
     def values(method: MethodScore) -> dict[int, float]:
         rows = method.per_frame[1:] if row is TIME else method.per_frame
         return {r.frame: v for r in rows
@@ -166,6 +171,8 @@ def _common(row: Metric, a: MethodScore, b: MethodScore) -> tuple[np.ndarray, np
 
     old, new = values(a), values(b)
     frames = sorted(old.keys() & new.keys())
+    infinite = {*identical(row, old), *identical(row, new)}
+    frames = [i for i in frames if i not in infinite] or frames
     return np.array([old[i] for i in frames]), np.array([new[i] for i in frames])
 
 
@@ -203,6 +210,13 @@ def _notes(a: Scores, b: Scores) -> Iterator[str]:
         if alone:
             yield f"Only {which} has {', '.join(alone)}."
     for name in (n for n in a.ordered() if n in b.methods):
+        for mine, which in ((a.methods[name], "A"), (b.methods[name], "B")):
+            if n := len(mine.identical_frames):
+                yield (f"{name} is identical to the reference on {n} frame{'s' * (n > 1)} of "
+                       f"{which}: changes in dB are without.")
+        old, new = a.methods[name].method, b.methods[name].method
+        if old and new and old != new:
+            yield f"{name} is {old} in A and {new} in B."
         if a.methods[name].parameters != b.methods[name].parameters:
             yield f"{name} has other parameters in B."
 

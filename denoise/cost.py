@@ -18,6 +18,7 @@ def cost(sequence: Sequence, run: Run | None, times: Times | None) -> dict[str, 
 
     `times` count if they are of the same parameters, size and device.
     """
+    name, changed = (run.method, run.changed) if run else ("", {})
     run = run or Run(method="input")
     ms = [run.ms[i] for i in sorted(run.ms)]
     height, width = sequence.size
@@ -26,7 +27,8 @@ def cost(sequence: Sequence, run: Run | None, times: Times | None) -> dict[str, 
                    and measured.parameters == run.parameters
                    and (times.size, times.device) == ((width, height), run.device))
     warm = measured.ms if measured and interleaved else median(ms[1:]) if ms[1:] else None
-    return {"ms_per_frame": warm, "first_ms": run.first_ms, "interleaved": interleaved,
+    return {"method": name, "changed": changed, "ms_per_frame": warm,
+            "first_ms": run.first_ms, "interleaved": interleaved,
             "startup_ms": startup(ms), "peak_mb": run.peak_mb,
             "megapixels_per_s": width * height / warm / 1e3 if warm else None,
             "device": run.device, "machine": run.machine, "threads": run.threads,

@@ -16,9 +16,11 @@ from pathlib import Path
 from render.errors import InputError
 from render.games202 import export_games202, import_result
 from render.machine import machine
-from render.manifest import Run, check_name
+from render.manifest import Run, check_result_name
 from render.sequence import Sequence
 from render.terminal import readable
+
+from .methods import check_not_a_method
 
 PLACES: tuple[str, ...] = ("{input}", "{output}", "{frames}")
 
@@ -36,7 +38,8 @@ def denoise_externally(sequence: Sequence, command: str, name: str, typed: str =
         InputError: the command cannot be used or fails (the message has its exit code and the
             last line it wrote to stderr), or it left no results, or bad ones.
     """
-    check_name(name, "method")
+    check_result_name(name, sequence.methods())
+    check_not_a_method(name, "external")
     words = _split(command)
     if missing := [i for i in sequence.frames if not sequence.has_frame(i)]:
         raise InputError(f"{sequence.folder} lacks frame {missing[0]}: render all frames first")
@@ -49,8 +52,8 @@ def denoise_externally(sequence: Sequence, command: str, name: str, typed: str =
         sequence.remove_results(name)
         done = import_result(sequence, made, name)
     said = {"external": readable(command), "timing": "whole program, with files"}
-    run = Run(method=name, parameters=said, device="external", machine=machine(), command=typed,
-              first_ms=ms, ms=dict.fromkeys(done, ms))
+    run = Run(method="external", parameters=said, device="external", machine=machine(),
+              command=typed, first_ms=ms, ms=dict.fromkeys(done, ms))
     sequence.write_run(name, run)
     return run
 

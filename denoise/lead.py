@@ -109,7 +109,7 @@ def lead(folders: tuple[Path, ...], method: str, peer: str) -> None:
     for name, (plain, ours) in scenes.items():
         floor = ours.reference_floor_db
         click.echo(f"\n{name}: {len(ours.frames)} frames of {ours.size[0]}x{ours.size[1]}, "
-                   f"reference {ours.reference_spp} spp, floor "
+                   f"reference {ours.reference_spp or 'of unknown'} spp, floor "
                    + (f"{floor:.1f} dB" if floor is not None else "not known")
                    + "".join(f"; {key} {_psnr(s.methods[key]):.2f} dB{where}"
                              for s, key, where in ((plain, "input", " (plain)"),

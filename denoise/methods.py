@@ -33,6 +33,9 @@ from .separable import BilateralSeparable
 from .svgf import Svgf
 from .temporal import Temporal
 
+OUTLIERS = "+outliers"
+"""Ends the name of a method before which outliers are removed."""
+
 
 class Method(Protocol):
     """What every denoiser offers.
@@ -91,6 +94,38 @@ def build(name: str, settings: Mapping[str, str] | None = None,
                              f"it has {', '.join(known)}")
         typed[key] = _parse(key, text, type(known[key]))
     return _replace(method, typed)
+
+
+def name_of(method: Any) -> str | None:
+    """The name under which `build` makes a method like this one; None for one of your own."""
+    if isinstance(method, WithoutOutliers):
+        inner = name_of(method.method)
+        return inner and inner + OUTLIERS
+    made = {**{name: kind() for name, kind in METHODS.items() if kind is type(method)},
+            **{name: peer.make() for name, peer in PEERS.items()}}
+    alike = {name: sum(getattr(other, f.name) == getattr(method, f.name) for f in fields(method))
+             for name, other in made.items() if type(other) is type(method)}
+    return max(alike, key=alike.__getitem__) if alike else None
+
+
+def changed(method: Any) -> dict[str, bool | int | float | str]:
+    """The parameters that are not the method's defaults; none for one of your own."""
+    inner = method.method if isinstance(method, WithoutOutliers) else method
+    name = name_of(inner)
+    if name is None:
+        return {}
+    default = parameters(build(name))
+    if inner is not method:
+        default.update(parameters(RemoveOutliers()))
+    return {key: value for key, value in parameters(method).items() if value != default[key]}
+
+
+def check_not_a_method(name: str, ran: str | None) -> None:
+    """InputError where results get the name of a method other than that which `ran`."""
+    plain = name.lower().removesuffix(OUTLIERS)
+    if name != ran and plain in (*METHODS, *PEERS):
+        raise InputError(f"'{name}' is the name of a method, and not of what makes these results "
+                         f"({ran or 'another one'}): use another --name")
 
 
 def channels_read(method: Method, there: Iterable[str]) -> tuple[str, ...]:

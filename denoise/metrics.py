@@ -88,7 +88,8 @@ class Metric:
 _ROWS = (
     Metric("psnr_srgb", "PSNR", psnr, "srgb", "dB", True, ".2f",
            f"10 log10(1 / mean((S(a) - S(b))^2)) on clipped sRGB, not quantised, "
-           f"at most {PSNR_CAP:g}; a sequence's is the mean over its frames"),
+           f"at most {PSNR_CAP:g}; a sequence's is the mean over its frames, without those "
+           "identical to the reference"),
     Metric("relmse", "relMSE", relmse, "linear", "", False, ".4f",
            "mean((a - b)^2 / (b^2 + 0.01)), linear; a sequence's is the mean over its frames"),
     Metric("smape", "SMAPE", smape, "linear", "", False, ".4f",

@@ -15,12 +15,12 @@ from PIL import Image
 from render.atomic import replacing
 from render.sequence import Sequence
 
-from .metrics import HEADLINE, blacken, non_finite, spread
+from .metrics import HEADLINE, pair, spread
 from .movie import MovieError, write_movie
 from .panels import GAP, error_legend, error_picture, panel, resize, scaled_size, tile
 from .plot import plot_speed_against_error
 from .scorecard import INPUT, Scores
-from .tonemap import bytes_from_linear, srgb_from_linear
+from .tonemap import bytes_from_linear
 
 SHEETS = 3
 WANTED, LARGE_ENOUGH, WIDEST = 480, 640, 3960  # widths in pixels: see `contact_sheet`
@@ -122,15 +122,15 @@ def movie_pictures(sequence: Sequence, scores: Scores, methods: list[str]) -> It
 
 
 def display_error(image: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """(h, w) mean over R, G, B of |S(a) - S(b)|; as in the scores, non-finite pixels are black."""
+    """(h, w) mean over R, G, B of |S(a) - S(b)|; non-finite pixels as in the scores."""
     return next(display_errors([image], reference))
 
 
 def display_errors(images: Iterable[np.ndarray], reference: np.ndarray) -> Iterator[np.ndarray]:
     """`display_error` of several images of one reference."""
-    b = srgb_from_linear(blacken(reference, non_finite(reference)))
     for image in images:
-        yield np.abs(srgb_from_linear(blacken(image, non_finite(image))) - b).mean(axis=-1)
+        a, b = pair(image, reference).srgb
+        yield np.abs(a - b).mean(axis=-1)
 
 
 def _images(sequence: Sequence, scores: Scores, frame: int,
@@ -149,4 +149,4 @@ def _images(sequence: Sequence, scores: Scores, frame: int,
         reference = sequence.read_reference(frame)
         floor = scores.reference_floor_per_frame.get(frame)
         cap = "" if floor is None else f", noise floor {floor:.1f} {HEADLINE.unit}"
-        yield "reference", f"{reference.spp} spp{cap}", reference.color
+        yield "reference", f"{reference.spp or 'unknown'} spp{cap}", reference.color

@@ -79,8 +79,9 @@ def _style(axes, scores: Scores) -> None:
     width, height = scores.size
     axes.set_title(f"{scores.scene}: speed against error", loc="left", color=_INK,
                    fontsize=14, fontweight="bold", pad=24)
-    axes.text(0, 1.02, f"{len(scores.frames)} frames, {width}x{height}, {scores.spp} spp, "
-              f"reference {scores.reference_spp} spp", transform=axes.transAxes,
+    spp, reference = (n or "unknown" for n in (scores.spp, scores.reference_spp))
+    axes.text(0, 1.02, f"{len(scores.frames)} frames, {width}x{height}, {spp} spp, "
+              f"reference {reference} spp", transform=axes.transAxes,
               color=_GREY, fontsize=10)
     axes.set_xscale("log")
     axes.set_ylabel(f"{HEADLINE.label} in {HEADLINE.unit} ({scores.tone_map})", color=_INK)

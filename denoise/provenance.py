@@ -46,7 +46,8 @@ def provenance(sequence: Sequence, scores: Scores, command: str = "") -> dict[st
         "versions": list(scores.versions.items()),
         "machines": _machines(sequence, runs, read_times(sequence.folder)),
         "methods": [{"name": name, "device": run.device, "threads": run.threads,
-                     "parameters": [(k, str(v)) for k, v in run.parameters.items()],
+                     "parameters": [*([("method", run.method)] if run.method != name else []),
+                                    *((k, str(v)) for k, v in run.parameters.items())],
                      "versions": list(run.versions.items()),
                      "machine": run.machine} for name, run in runs.items()],
     }

@@ -2,21 +2,21 @@
 
 Streams: two frames in a row of each method are in memory at a time. The number of a sequence is
 the mean of its frames' (for PSNR too: not the PSNR of the pooled squared error, which the worst
-frame would dominate).
+frame would dominate); `means.py` says which frames count.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from statistics import fmean
 from typing import Any
 
 import numpy as np
 
 from render.atomic import write_text
 from render.errors import InputError
+from render.manifest import format_frames
 from render.sequence import Reference, Sequence
 
 from .bias import split_errors
@@ -24,12 +24,16 @@ from .cost import cost
 from .ground import read_ground
 from .interleave import read_times
 from .judge import Judge
-from .metrics import METRICS, reference_floor, spread
+from .means import identical, mean_decibels, mean_over_frames
+from .metrics import HEADLINE, METRICS, PSNR_CAP, non_finite, reference_floor, spread
 from .pictures import Progress, draw_pictures
 from .provenance import commands
 from .scorecard import INPUT, MethodScore, Scores
 from .stability import MEASURES
 from .tonemap import TONE_MAP
+
+MOST_LOST = 0.01
+"""Share of a reference's pixels that may be non-finite; they count as no error in every image."""
 
 
 def score(sequence: Sequence, methods: list[str] | None = None, pictures: bool = True,
@@ -87,7 +91,7 @@ def measure_sequence(sequence: Sequence, methods: list[str] | None = None,
         here = ground if n and frames[n - 1] == before else None
         ground, frame = read_ground(sequence, number, here)
         if ground.reference is not None:
-            known[number] = _Known(ground.reference.spp, _floor(ground.reference))
+            known[number] = _known(sequence, number, ground.reference)
         metrics = [name for name in METRICS if number in chosen[name]]
         judges[INPUT].see(number, before, frame["color"], ground, None, metrics)
         for name in names:
@@ -97,7 +101,7 @@ def measure_sequence(sequence: Sequence, methods: list[str] | None = None,
         if progress:
             progress(n + 1, len(frames), "score")
     times = read_times(sequence.folder)
-    methods_scored = {name: _summary(judge, cost(sequence, runs.get(name), times))
+    methods_scored = {name: _summary(judge, judges[INPUT], cost(sequence, runs.get(name), times))
                       for name, judge in judges.items()}
     return _scores(sequence, frames, known, methods_scored)
 
@@ -110,10 +114,11 @@ def _chosen(sequence: Sequence, frames: list[int]) -> dict[str, list[int]]:
 
 @dataclass(frozen=True)
 class _Known:
-    """What was read of a frame's reference."""
+    """What was read of a frame's reference; `spp` and `floor` are None where not known."""
 
-    spp: int
+    spp: int | None
     floor: float | None
+    non_finite_pixels: int
 
 
 def _methods(sequence: Sequence, wanted: list[str] | None) -> list[str]:
@@ -128,6 +133,16 @@ def _methods(sequence: Sequence, wanted: list[str] | None) -> list[str]:
     return [name for name in dict.fromkeys(wanted) if name != INPUT]
 
 
+def _known(sequence: Sequence, number: int, reference: Reference) -> _Known:
+    """InputError where so much of a reference is not finite that the rest says little."""
+    lost = int(non_finite(reference.color).sum())
+    if lost > MOST_LOST * reference.color[..., 0].size:
+        raise InputError(f"the reference of frame {number} in {sequence.folder} has {lost} of "
+                         f"{reference.color[..., 0].size} pixels that are not finite: make it "
+                         "again, or delete it and the frame is not judged")
+    return _Known(reference.spp, _floor(reference), lost)
+
+
 def _floor(reference: Reference) -> float | None:
     """None where the variance isn't known (a reference of one sample, or from elsewhere)."""
     if not np.isfinite(reference.variance).any():
@@ -135,17 +150,16 @@ def _floor(reference: Reference) -> float | None:
     return reference_floor(reference.color, reference.variance)
 
 
-def _mean(values: Iterable[float | None]) -> float | None:
-    """Mean of what was measured, None if nothing was."""
-    measured = [v for v in values if v is not None]
-    return fmean(measured) if measured else None
-
-
-def _summary(judge: Judge, spent: dict[str, Any]) -> MethodScore:
+def _summary(judge: Judge, unfiltered: Judge, spent: dict[str, Any]) -> MethodScore:
+    """`unfiltered`: the judge of the input."""
     rows = judge.rows
-    means: dict[str, Any] = {name: _mean(row[name] for row in rows) for name in MEASURES}
+    means: dict[str, Any] = {}
+    for name, row in MEASURES.items():
+        untouched = identical(row, {r.frame: r[name] for r in unfiltered.rows})
+        means[name] = mean_over_frames(row, {r.frame: r[name] for r in rows}, untouched)
     return MethodScore(
         **spent, non_finite_pixels=sum(row.non_finite_pixels for row in rows),
+        identical_frames=identical(HEADLINE, {r.frame: r[HEADLINE.name] for r in rows}),
         by_cause=judge.causes.scores(), by_history=judge.histories.scores(), per_frame=rows,
         **means)
 
@@ -157,8 +171,10 @@ def _scores(sequence: Sequence, frames: list[int], known: dict[int, _Known],
     return Scores(
         scene=manifest.scene, frames=frames, size=(manifest.width, manifest.height),
         seed=manifest.seed, spp=manifest.spp,
-        reference_spp=min((k.spp for k in known.values()), default=None),
-        reference_floor_db=_mean(floors.values()), reference_floor_per_frame=floors,
+        reference_spp=min((k.spp for k in known.values() if k.spp), default=None),
+        reference_floor_db=mean_decibels(floors.values()) if floors else None,
+        reference_floor_per_frame=floors,
+        reference_non_finite_pixels=sum(k.non_finite_pixels for k in known.values()),
         tone_map=TONE_MAP, versions=manifest.versions, machine=manifest.machine,
         notes=list(_notes(manifest.frames, frames, known, methods)), methods=methods)
 
@@ -173,9 +189,14 @@ def _notes(wanted: tuple[int, ...], frames: list[int], known: dict[int, _Known],
     elif len(known) < len(frames):
         yield (f"{len(known)} of {len(frames)} frames have a reference; errors are means over "
                "these.")
-    if len({k.spp for k in known.values()}) > 1:
-        yield (f"References have {min(k.spp for k in known.values())} to "
-               f"{max(k.spp for k in known.values())} samples a pixel.")
+    samples = {k.spp for k in known.values() if k.spp}
+    if len(samples) > 1:
+        yield f"References have {min(samples)} to {max(samples)} samples a pixel."
+    holes = {i: k.non_finite_pixels for i, k in known.items() if k.non_finite_pixels}
+    if holes:
+        yield (f"References have {sum(holes.values())} pixels that are not finite "
+               f"(frames {format_frames(holes)}), which were not judged: black in both images.")
+    yield from _notes_on_identical(methods)
     timed = [name for name, method in methods.items() if method.interleaved]
     if timed:
         others = any(m.ms_per_frame for m in methods.values() if not m.interleaved)
@@ -183,9 +204,35 @@ def _notes(wanted: tuple[int, ...], frames: list[int], known: dict[int, _Known],
                + ("; the others are medians of their own runs, and compare less well." if others
                   else "."))
     for name, method in methods.items():
+        if method.changed:
+            yield (f"{name} ran with "
+                   + ", ".join(f"{k}={v}" for k, v in method.changed.items())
+                   + " instead of the default.")
         if len(method.per_frame) < len(frames):
             yield (f"{name} has {len(method.per_frame)} of {len(frames)} frames; its numbers are "
                    "over these alone.")
         if method.non_finite_pixels:
             yield (f"{name} has {method.non_finite_pixels} non-finite pixels, which were scored "
                    "as black.")
+
+
+def _notes_on_identical(methods: dict[str, MethodScore]) -> Iterator[str]:
+    """Which frames `means.py` leaves out."""
+    untouched = methods[INPUT].identical_frames
+    if untouched:
+        off = {name: min(values) for name, method in methods.items()
+               if (values := [db for row in method.per_frame if row.frame in untouched
+                              and (db := row[HEADLINE.name]) is not None and db < PSNR_CAP])}
+        yield (f"The input is identical to the reference on {_frames(untouched)}: means in dB are "
+               "without" + (", though " + ", ".join(
+                   f"{name} has {db:.1f} {HEADLINE.unit} there" for name, db in off.items())
+                   if off else "") + ".")
+    for name, method in methods.items():
+        own = [i for i in method.identical_frames if i not in untouched]
+        if own:
+            yield (f"{name} is identical to the reference on {_frames(own)}: its means in dB are "
+                   "without.")
+
+
+def _frames(numbers: list[int]) -> str:
+    return f"{len(numbers)} frame{'s' * (len(numbers) > 1)} ({format_frames(numbers)})"

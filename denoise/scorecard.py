@@ -16,6 +16,7 @@ from pydantic import ConfigDict, Field, FiniteFloat, field_validator, model_seri
 
 from render.json_file import JsonFile, format_json, read_json
 
+from .metrics import HEADLINE
 from .stability import MEASURES
 
 INPUT = "input"
@@ -69,21 +70,25 @@ class ErrorSplit(JsonFile):
 
 
 class MethodScore(Measured):
-    """One method over the sequence; its measures are means over `per_frame`.
+    """One method over the sequence; its measures are means over `per_frame` (`means.py`).
 
     Attributes:
+        method: what made the results, as `Run.method`; "" for the input. changed: `Run.changed`.
         ms_per_frame: median over the frames after the first. first_ms: the first, which
             includes compiling. Both null for the input. `interleaved`: the median is that of
             `onespp time`, measured in turns with other methods.
         startup_ms: what the first three frames took beyond that median each: compiling, loading.
         megapixels_per_s: pixels over that median. peak_mb: of `Run`.
         non_finite_pixels: sum over frames; such pixels were scored as black.
+        identical_frames: those that display the same as the reference: infinite PSNR.
         device, machine, threads, parameters, versions: of the run that made the results.
         by_cause, by_history: error by `classes.CAUSES` and `HISTORIES`, over the frames that
             have a frame before them; empty without reference or guides.
         split: bias and variance, where other seeds were given.
     """
 
+    method: str = ""
+    changed: dict[str, Any] = Field(default_factory=dict)
     ms_per_frame: FiniteFloat | None
     first_ms: FiniteFloat | None
     startup_ms: FiniteFloat | None = None
@@ -91,6 +96,7 @@ class MethodScore(Measured):
     peak_mb: FiniteFloat | None = None
     interleaved: bool = False
     non_finite_pixels: int
+    identical_frames: list[int] = Field(default_factory=list)
     device: str
     machine: str = ""
     threads: int | None
@@ -107,9 +113,10 @@ class Scores(JsonFile):
 
     Attributes:
         frames: numbers of the frames scored. size: width, height.
-        reference_spp: null where there is no reference.
+        spp, reference_spp: null where they are not known, as for imports.
         reference_floor_db: PSNR that a perfect image is expected to get against this noisy
             reference, mean over frames; per frame in `reference_floor_per_frame`.
+        reference_non_finite_pixels: sum over frames; such pixels were not judged.
         versions, machine: of what rendered the frames.
         commands: command lines that made the sequence, the results, the times and these scores,
             as they were typed, in that order; those that were not recorded are missing.
@@ -121,10 +128,11 @@ class Scores(JsonFile):
     frames: list[int]
     size: tuple[int, int]
     seed: int | None
-    spp: int
+    spp: int | None
     reference_spp: int | None
     reference_floor_db: FiniteFloat | None
     reference_floor_per_frame: dict[int, FiniteFloat]
+    reference_non_finite_pixels: int = 0
     tone_map: str
     versions: dict[str, str]
     machine: str = ""
@@ -141,7 +149,12 @@ class Scores(JsonFile):
 
     @property
     def has_reference(self) -> bool:
-        return self.reference_spp is not None
+        return self.methods[INPUT][HEADLINE.name] is not None
+
+    def label(self, name: str) -> str:
+        """A method's name for a table, with what ran where that is something else."""
+        ran = self.methods[name].method
+        return f"{name} ({ran})" if ran not in ("", name) else name
 
     def ordered(self) -> list[str]:
         """Names of the methods: input, then from fast to slow, then those without a time."""

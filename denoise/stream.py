@@ -21,12 +21,19 @@ import numpy as np
 from render import backend
 from render.frame import Frame
 from render.machine import machine
-from render.manifest import Run
+from render.manifest import Run, check_result_name
 from render.sequence import Sequence
 from render.versions import versions
 
 from .memory import PeakMemory
-from .methods import Method, channels_read, parameters
+from .methods import (
+    Method,
+    changed,
+    channels_read,
+    check_not_a_method,
+    name_of,
+    parameters,
+)
 from .outliers import energy_kept
 from .timing import timed
 
@@ -124,10 +131,13 @@ def denoise_sequence(sequence: Sequence, method: Method, name: str,
     ms: dict[int, float] = {}
     dr.flush_malloc_cache()  # so that this method's memory is seen, and not the last one's
     peak = PeakMemory()
-    run = Run(method=name, parameters=parameters(method), device=backend.choose(),
-              threads=dr.thread_count(), versions=versions("drjit"),
+    ran = name_of(method) or name  # a method of one's own is called what its results are
+    check_result_name(name, sequence.methods())
+    check_not_a_method(name, name_of(method))
+    run = Run(method=ran, parameters=parameters(method), changed=changed(method),
+              device=backend.choose(), threads=dr.thread_count(), versions=versions("drjit"),
               machine=machine(backend.choose()), command=command)
-    _remove_stale(sequence, run)
+    _remove_stale(sequence, name, run)
     frames = [i for i in sequence.frames if sequence.has_frame(i)]
     used = channels_read(method, sequence.manifest.channels)
     state = method.init(*sequence.size)
@@ -158,10 +168,11 @@ def denoise_sequence(sequence: Sequence, method: Method, name: str,
     return run
 
 
-def _remove_stale(sequence: Sequence, run: Run) -> None:
+def _remove_stale(sequence: Sequence, name: str, run: Run) -> None:
     """Drop results that this run would otherwise be mixed with: others', and a killed run's."""
-    if run.method in sequence.methods():
-        old = sequence.read_run(run.method)
-        if (old.parameters, old.versions) == (run.parameters, run.versions):
+    if name in sequence.methods():
+        old = sequence.read_run(name)
+        if all(getattr(old, key) == getattr(run, key)
+               for key in ("method", "parameters", "versions")):
             return
-    sequence.remove_results(run.method)
+    sequence.remove_results(name)

@@ -19,7 +19,7 @@ from .scorecard import INPUT, ClassScore, MethodScore, Scores
 from .stability import MEASURES
 from .table import cells
 
-_SHOWN_ELSEWHERE = {"ms_per_frame", "machine", *MEASURES}
+_SHOWN_ELSEWHERE = {"method", "ms_per_frame", "machine", *MEASURES}
 
 
 def page_data(sequence: Sequence, scores: Scores, channels: list[str],
@@ -184,15 +184,16 @@ def highlights(scores: Scores) -> list[dict[str, str]]:
         tiles.append({"label": "Noise floor of the reference",
                       "value": f"{scores.reference_floor_db:.1f} {HEADLINE.unit}",
                       "about": f"{scores.reference_spp} spp; a perfect image would score this"})
+    samples = "" if scores.spp is None else (
+        f" at {scores.spp} sample{'s' if scores.spp > 1 else ''} a pixel")
     tiles.append({"label": "Sequence", "value": f"{len(scores.frames)} frames",
-                  "about": f"{width}x{height} at {scores.spp} sample"
-                           f"{'s' if scores.spp > 1 else ''} a pixel"})
+                  "about": f"{width}x{height}{samples}"})
     return tiles
 
 
 def _tile(scores: Scores, label: str, name: str) -> dict[str, str]:
     row = cells(scores, name)
-    parts = [name]
+    parts = [scores.label(name)]
     if row[f"gain ({HEADLINE.unit})"] != "-":
         parts.append(f"{row[f'gain ({HEADLINE.unit})']} {HEADLINE.unit} over the input")
     if row["ms/frame"] != "-":

@@ -35,8 +35,9 @@ def table(scores: Scores) -> Table:
                         no_wrap=heading != "method")
     best = _best(scores)
     for name in scores.ordered():
-        grid.add_row(name, *(f"[bold]{text}[/bold]" if (name, heading) in best else text
-                             for heading, text in cells(scores, name).items()))
+        grid.add_row(scores.label(name), *(
+            f"[bold]{text}[/bold]" if (name, heading) in best else text
+            for heading, text in cells(scores, name).items()))
     return grid
 
 
@@ -72,8 +73,8 @@ def print_classes(scores: Scores, console: Console | None = None) -> None:
         pixels = next(iter(rows.values()))
         grid.add_row("of all pixels", *(f"{pixels[c].pixels:.1%}" for c in shown), style="dim")
         for name, row in rows.items():
-            grid.add_row(name, *(f"{_number(row[c].psnr_srgb, '.1f')} {row[c].mse_share:4.0%}"
-                                 for c in shown))
+            grid.add_row(scores.label(name), *(
+                f"{_number(row[c].psnr_srgb, '.1f')} {row[c].mse_share:4.0%}" for c in shown))
         console.print(grid)
 
 
@@ -87,7 +88,8 @@ def print_splits(scores: Scores, console: Console | None = None) -> None:
     for name in scores.ordered():
         if s := scores.methods[name].split:
             bias = max(0.0, s.bias_squared)
-            grid.add_row(name, str(s.renders), f"{bias ** 0.5:.4f}", f"{s.variance ** 0.5:.4f}",
+            grid.add_row(scores.label(name), str(s.renders), f"{bias ** 0.5:.4f}",
+                         f"{s.variance ** 0.5:.4f}",
                          f"{bias / (bias + s.variance):.0%}" if bias + s.variance else "-")
     console.print(grid)
 
@@ -98,7 +100,7 @@ def caption(scores: Scores) -> str:
     parts = [f"{len(scores.frames)} frames of {width}x{height}"]
     if scores.has_reference:
         parts.append(f"{HEADLINE.label} on {scores.tone_map}, mean over frames")
-        parts.append(f"reference {scores.reference_spp} spp")
+        parts.append(f"reference {scores.reference_spp or 'of unknown'} spp")
         if scores.reference_floor_db is not None:
             parts[-1] += (f", whose own noise caps {HEADLINE.label} at "
                           f"{scores.reference_floor_db:.1f} {HEADLINE.unit}")
@@ -118,11 +120,14 @@ def _number(value: float | None, form: str) -> str:
 
 
 def _gain(scores: Scores, method: MethodScore) -> float | None:
-    """dB over the input on the frames that the method has."""
-    noisy = {row.frame: row[HEADLINE.name] for row in scores.methods[INPUT].per_frame}
-    gains = [db - base for row in method.per_frame
-             if (db := row[HEADLINE.name]) is not None and (base := noisy[row.frame]) is not None]
-    return sum(gains) / len(gains) if gains else None
+    """dB over the input on the frames that the method has and that count in both means."""
+    unfiltered = scores.methods[INPUT]
+    noisy = {row.frame: row[HEADLINE.name] for row in unfiltered.per_frame}
+    gains = {row.frame: db - base for row in method.per_frame
+             if (db := row[HEADLINE.name]) is not None and (base := noisy[row.frame]) is not None}
+    left_out = {*unfiltered.identical_frames, *method.identical_frames}
+    counted = [gain for i, gain in gains.items() if i not in left_out] or list(gains.values())
+    return sum(counted) / len(counted) if counted else None
 
 
 def _best(scores: Scores) -> set[tuple[str, str]]:

@@ -22,6 +22,7 @@ from render.errors import InputError
 from render.frame import Frame
 from render.sequence import Sequence
 
+from .means import mean_decibels
 from .methods import Method, build, channels_read, parameters
 from .metrics import psnr
 from .tonemap import srgb_from_linear
@@ -65,7 +66,7 @@ def mean_psnr(method: Method, cases: list[Case]) -> float:
         for frame, reference in zip(case.frames, case.references):
             image, state = method(frame, state)
             values.append(psnr(srgb_from_linear(image), reference))
-        means.append(fmean(values))
+        means.append(mean_decibels(values))
     return fmean(means)
 
 

@@ -34,6 +34,10 @@ threads_option = click.option("--threads", type=int, metavar="N", help="CPU thre
 frames_option = click.option("--frames", metavar="RANGE",
                              help="As 0:20 (0 to 19), 0:20:2, 7 or 0,5,9; default all.")
 
+overwrite_option = click.option(
+    "--overwrite/--resume", default=False,
+    help="Replace another sequence in the folder, or go on with the same one where it stopped; "
+         "default resume.")
 
 OFFERED = (*FRAME, *SPLIT, *SHADOW, *GLOSS, *REPLAY)
 
@@ -61,10 +65,7 @@ def render_options(command):
         click.option("--sampler", default="zsobol", show_default=True,
                      type=click.Choice(["pcg", "zsobol", "bluenoise"]),
                      help="Random numbers: independent, or with blue-noise error (two kinds)."),
-        click.option("--overwrite/--resume", default=False,
-                     help="Replace another sequence in the folder, or go on with the same one "
-                          "where it stopped; default resume."),
-        device_option, threads_option,
+        overwrite_option, device_option, threads_option,
     )):
         command = option(command)
     return command
@@ -137,16 +138,32 @@ FORMATS = click.option("--format", "layout", type=click.Choice(["games202"]), de
 @click.command("import")
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
-              help="Folder of the sequence; default data/NAME of the folder.")
+              help="Folder of the sequence; default data/NAME, NAME that of the folder, or of the "
+              "one that `input/` is in.")
+@click.option("--fps", type=float, default=24.0, show_default=True, metavar="N",
+              help="Frames a second, for the movie.")
+@click.option("--check/--no-check", default=True, show_default=True,
+              help="Refuse frames whose matrices, depth or normals follow other conventions.")
+@overwrite_option
 @FORMATS
-def import_(folder: Path, out: Path | None, layout: str) -> None:
-    """Make a sequence of FOLDER, which holds frames in another layout."""
-    from .games202 import import_games202
+def import_(folder: Path, out: Path | None, fps: float, check: bool, overwrite: bool,
+            layout: str) -> None:
+    """Make a sequence of FOLDER, which holds frames in another layout.
 
-    out = out or Path("data") / folder.resolve().name
-    with writing(out, "render"):
-        sequence = import_games202(folder, out, command=command_line())
+    FOLDER has beauty_0.exr and so on, or a folder `input` that has. Results (result_0.exr; or in
+    `output`) and references (reference_0.exr; or in `reference`) beside them come along.
+    """
+    from .games202 import import_games202
+    from .games202_files import find_files
+
+    out = out or Path("data") / find_files(folder).name
+    notes: list[str] = []
+    with writing(out, "render", alone=overwrite):
+        sequence = import_games202(folder, out, fps=fps, overwrite=overwrite, check=check,
+                                   command=command_line(), tell=notes.append)
     click.echo(f"imported {len(sequence.frames)} frames into {sequence.folder}")
+    for note in notes:
+        click.echo(note)
 
 
 @click.command()

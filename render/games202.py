@@ -9,62 +9,81 @@
 |                                          | object by ID, camera from world, screen from world |
 | result_%d.exr                            | what a program makes of it, channels R, G, B, half |
 
-Frames count from 0, unpadded. Screen: x right, y down, pixel centres at + 0.5, fourth component
-the depth, which is camera-space z: as in `render/frame.py`. Background: ID -1, normal, depth and
-beauty 0, position the camera's origin.
+Frames count from 0, unpadded (an import takes more names, see `games202_files.py`). Screen: x
+right, y down, pixel centres at + 0.5, fourth component the depth, which is camera-space z: as in
+`render/frame.py`. Background: ID -1, normal, depth and beauty 0, position the camera's origin.
 
 Their camera space is free (the assignment's own has y up and is left-handed). Nothing but z is
 ever used of it, so an import keeps what it finds, and an export has x right, y down, z forward.
 An export rounds matrices to float32; an import loses nothing, and exports to the same values.
+
+What an import cannot know is null in its manifest: seed, samples a pixel, estimator, sampler. A
+gap in the frame numbers is kept: matrices say what moved from the one frame to the other, so
+history is carried over it as it is over a stride (`--frames 0:32:2`).
 """
 
 from __future__ import annotations
 
 import hashlib
-import re
 import struct
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from .atomic import read_bytes, write_bytes
+from .conventions import check_frame, check_motion
 from .errors import InputError
 from .exr import read_exr, read_header, write_exr
 from .frame import Frame
+from .games202_files import STEMS, Found, find_files, gaps, numbered
 from .json_file import checked
-from .manifest import Manifest, Run, check_name
-from .sequence import Sequence, object_ids
+from .manifest import Manifest, Run, check_result_name, format_frames
+from .sequence import Reference, Sequence, object_ids
 
 _RGB = ("R", "G", "B")
 _FILES = {"color": ("beauty", _RGB), "normal": ("normal", _RGB), "position": ("position", _RGB),
           "depth": ("depth", ("Y",)), "id": ("ID", ("Y",))}
-_STEMS = (*(stem for stem, _ in _FILES.values()), "matrix")
 _MOST_OBJECTS = 1 << 16
 _MATRIX = 64  # bytes
+_CHECKED = 6  # frames whose conventions are checked before anything is written
+RESULTS = "result"
+"""The name of results that are found beside frames."""
 
 
 def import_games202(folder: Path | str, out: Path | str, *, scene: str | None = None,
-                    fps: float = 24.0, overwrite: bool = False, command: str = "") -> Sequence:
+                    fps: float = 24.0, overwrite: bool = False, command: str = "",
+                    check: bool = True,
+                    tell: Callable[[str], None] = lambda note: None) -> Sequence:
     """Read all frames of a folder in the assignment's layout into a new sequence at `out`.
 
-    `command` is the command line, for the manifest.
+    Results and references beside the frames come along (`games202_files.py`): results as those of
+    `RESULTS`, references with unknown samples and variance.
+
+    Args:
+        command: the command line, for the manifest.
+        check: refuse frames of other conventions (`conventions.py`).
+        tell: called with a sentence on what a user should know, as gaps in the numbers.
 
     Raises:
         InputError: no frames, or a file of one is missing, damaged, or disagrees with the rest.
     """
     folder = Path(folder)
-    frames = sorted({i for stem in _STEMS for i in _numbers(folder, stem)})
-    if not frames:
-        raise InputError(f"{folder} has no beauty_0.exr, depth_0.exr ...: give a folder with "
-                         "the input of the assignment")
-    header = read_header(folder / f"beauty_{frames[0]}.exr")
-    objects = len(read_mat(folder / f"matrix_{frames[0]}.mat")) - 2
+    found = find_files(folder)
+    frames = found.frames
+    header = read_header(found.file("beauty", frames[0]))
+    size = header.height, header.width
+    objects = len(read_mat(found.file("matrix", frames[0]))) - 2
     digest = hashlib.sha256()
     for i in frames:  # before anything is written
-        _check_files(folder, i, (header.height, header.width), objects)
-        for stem in _STEMS:
-            digest.update((folder / f"{stem}_{i}{_suffix(stem)}").read_bytes())
-    name = scene or "".join(c for c in folder.resolve().name if c.isprintable()) or "import"
+        _check_files(found, i, size, objects)
+        for stem in STEMS:
+            digest.update(found.file(stem, i).read_bytes())
+    for path in (*found.results.values(), *found.references.values()):
+        _check_image(path, _RGB, size, "the first frame's beauty")
+    if check:
+        _check_conventions(found, size, objects)
+    name = scene or found.name
     digits = len(str(objects - 1))
     sequence = Sequence.create(out, checked(
         Manifest, f"the sequence to make of {folder}", source="games202", scene=name,
@@ -74,8 +93,72 @@ def import_games202(folder: Path | str, out: Path | str, *, scene: str | None = 
         objects=tuple(f"object_{i:0{digits}d}" for i in range(objects))), overwrite)
     for i in frames:
         if not sequence.has_frame(i):
-            sequence.write_frame(_read_frame(folder, i, sequence), {"scene": name})
+            frame = _read_frame(found, i, size, objects)
+            if check:
+                _check_convention(found, frame)
+            sequence.write_frame(frame, {"scene": name})
+    for a, b in gaps(frames):
+        tell(f"there is no frame between {a} and {b}: methods with a history take {b} for the "
+             f"frame after {a}")
+    _take_references(found, sequence, tell)
+    _take_results(found, sequence, tell)
     return sequence
+
+
+def _check_conventions(found: Found, size: tuple[int, int], objects: int) -> None:
+    """Of a few frames, spread, and of the motion from one to the next."""
+    frames = found.frames
+    step = -(-len(frames) // _CHECKED)
+    for i, before in zip(frames[::step], [None, *frames][::step]):
+        frame = _read_frame(found, i, size, objects)
+        _check_convention(found, frame)
+        if before is not None:
+            _check_convention(found, frame, _read_frame(found, before, size, objects))
+
+
+def _check_convention(found: Found, frame: Frame, before: Frame | None = None) -> None:
+    try:
+        if before is None:
+            check_frame(frame)
+        else:
+            check_motion(before, frame)
+    except InputError as error:
+        raise InputError(f"frame {frame.index} of {found.folder} {error} (--no-check takes frames "
+                         "as they are)") from None
+
+
+def _take_references(found: Found, sequence: Sequence, tell: Callable[[str], None]) -> None:
+    taken = [i for i in found.references if i in sequence.frames]
+    for i in taken:
+        color = _image(found.references[i], _RGB, sequence.size)
+        sequence.write_reference(i, Reference(color, np.full_like(color, np.nan), None))
+    if taken:
+        tell(f"took {len(taken)} references from {found.references[taken[0]].parent}; how many "
+             "samples they have, and how noisy they are, is not known")
+    _tell_strangers("references", found.references, sequence, tell)
+
+
+def _take_results(found: Found, sequence: Sequence, tell: Callable[[str], None]) -> None:
+    taken = [i for i in found.results if i in sequence.frames]
+    if taken:
+        sequence.remove_results(RESULTS)
+        for i in taken:
+            sequence.write_result(RESULTS, i, _image(found.results[i], _RGB, sequence.size))
+        sequence.write_run(RESULTS, _run_of_files(found.results[taken[0]].parent))
+        tell(f"took {len(taken)} results from {found.results[taken[0]].parent}, as those of "
+             f"the method '{RESULTS}'")
+    _tell_strangers("results", found.results, sequence, tell)
+
+
+def _tell_strangers(what: str, files: Mapping[int, Path], sequence: Sequence,
+                    tell: Callable[[str], None]) -> None:
+    strangers = [i for i in files if i not in sequence.frames]
+    if strangers:
+        tell(f"left out {what} without a frame: {format_frames(strangers)}")
+
+
+def _run_of_files(folder: Path) -> Run:
+    return Run(method="files", parameters={"source": f"result files in {folder.resolve().name}"})
 
 
 def export_games202(sequence: Sequence, folder: Path | str) -> list[Path]:
@@ -87,7 +170,7 @@ def export_games202(sequence: Sequence, folder: Path | str) -> list[Path]:
         InputError: the sequence lacks a channel or a frame, or the disk refuses.
     """
     folder = Path(folder)
-    if folder.is_dir() and max(_numbers(folder, "beauty"), default=0) >= len(sequence.frames):
+    if folder.is_dir() and max(numbered(folder, "beauty"), default=0) >= len(sequence.frames):
         raise InputError(f"{folder} holds frames of a longer sequence, which would be taken for "
                          "this one's: choose another folder")
     written = []
@@ -117,18 +200,17 @@ def import_result(sequence: Sequence, folder: Path | str, method: str) -> list[i
         InputError: no results, more of them than frames, or one that is damaged or of another size.
     """
     folder, frames = Path(folder), sequence.frames
-    check_name(method, "method")
-    numbers = _numbers(folder, "result")
-    if not numbers:
+    check_result_name(method, sequence.methods())
+    files = numbered(folder, "result")
+    if not files:
         raise InputError(f"{folder} has no result_0.exr, result_1.exr ...")
-    if numbers[-1] >= len(frames):
-        raise InputError(f"{folder}/result_{numbers[-1]}.exr has no frame: {sequence.folder} "
+    if (last := max(files)) >= len(frames):
+        raise InputError(f"{files[last]} has no frame: {sequence.folder} "
                          f"has {len(frames)} frames, so results end at {len(frames) - 1}")
-    for k in numbers:
-        image = _image(folder / f"result_{k}.exr", _RGB, sequence.size)
-        sequence.write_result(method, frames[k], image)
-    sequence.write_run(method, Run(method=method, parameters={"source": "games202 result files"}))
-    return [frames[k] for k in numbers]
+    for k, path in files.items():
+        sequence.write_result(method, frames[k], _image(path, _RGB, sequence.size))
+    sequence.write_run(method, _run_of_files(folder))
+    return [frames[k] for k in files]
 
 
 def export_results(sequence: Sequence, method: str, folder: Path | str) -> list[Path]:
@@ -172,34 +254,24 @@ def write_mat(path: Path, matrices: np.ndarray) -> None:
     write_bytes(path, struct.pack("<i", len(matrices) - 2) + matrices.astype("<f4").tobytes())
 
 
-def _suffix(stem: str) -> str:
-    return ".mat" if stem == "matrix" else ".exr"
-
-
-def _numbers(folder: Path, stem: str) -> list[int]:
-    """The %d of the files stem_%d.exr (or .mat) in a folder, increasing."""
-    if not folder.is_dir():
-        raise InputError(f"{folder} is not a folder")
-    name = re.compile(stem + r"_(0|[1-9][0-9]{0,5})" + re.escape(_suffix(stem)))
-    matches = (name.fullmatch(path.name) for path in folder.iterdir())
-    return sorted(int(match[1]) for match in matches if match)
-
-
-def _check_files(folder: Path, i: int, size: tuple[int, int], objects: int) -> None:
+def _check_files(found: Found, i: int, size: tuple[int, int], objects: int) -> None:
     """A frame's files are there, whole, and of the size and number of objects of the first."""
     for stem, names in _FILES.values():
-        path = folder / f"{stem}_{i}.exr"
-        header = read_header(path)
-        if (header.height, header.width) != size:
-            raise InputError(f"{path} is {header.width}x{header.height} pixels, the first frame's "
-                             f"beauty is {size[1]}x{size[0]}")
-        if missing := [name for name in names if name not in header.channels]:
-            raise InputError(f"{path} lacks the channel {missing[0]} "
-                             f"(it has {', '.join(map(repr, header.channels))})")
-    path = folder / f"matrix_{i}.mat"
-    if (found := len(read_mat(path)) - 2) != objects:
-        raise InputError(f"{path} holds matrices of {found} objects, "
+        _check_image(found.file(stem, i), names, size, "the first frame's beauty")
+    path = found.file("matrix", i)
+    if (there := len(read_mat(path)) - 2) != objects:
+        raise InputError(f"{path} holds matrices of {there} objects, "
                          f"the first frame's of {objects}")
+
+
+def _check_image(path: Path, names: tuple[str, ...], size: tuple[int, int], other: str) -> None:
+    header = read_header(path)
+    if (header.height, header.width) != size:
+        raise InputError(f"{path} is {header.width}x{header.height} pixels, {other} is "
+                         f"{size[1]}x{size[0]}")
+    if missing := [name for name in names if name not in header.channels]:
+        raise InputError(f"{path} lacks the channel {missing[0]} "
+                         f"(it has {', '.join(map(repr, header.channels))})")
 
 
 def _image(path: Path, names: tuple[str, ...], size: tuple[int, int]) -> np.ndarray:
@@ -209,10 +281,9 @@ def _image(path: Path, names: tuple[str, ...], size: tuple[int, int]) -> np.ndar
     return image if len(names) > 1 else image[..., 0]
 
 
-def _read_frame(folder: Path, i: int, sequence: Sequence) -> Frame:
-    images = {channel: _image(folder / f"{stem}_{i}.exr", names, sequence.size)
+def _read_frame(found: Found, i: int, size: tuple[int, int], objects: int) -> Frame:
+    images = {channel: _image(found.file(stem, i), names, size)
               for channel, (stem, names) in _FILES.items()}
-    path = folder / f"ID_{i}.exr"
-    images["id"] = object_ids(path, images["id"], len(sequence.manifest.objects))
-    matrices = read_mat(folder / f"matrix_{i}.mat")
+    images["id"] = object_ids(found.file("ID", i), images["id"], objects)
+    matrices = read_mat(found.file("matrix", i))
     return Frame(i, images, matrices[-2], matrices[-1], matrices[:-2])

@@ -231,7 +231,7 @@ def _smaller_reference(job: RenderJob, sequence: FrameSequence, index: int) -> P
         smaller = sequence.read_reference(index) if sequence.has_reference(index) else None
     except InputError:  # damaged: it is made again
         return None
-    if smaller is None or not 2 <= smaller.spp < (job.reference_spp or 0):
+    if smaller is None or smaller.spp is None or not 2 <= smaller.spp < (job.reference_spp or 0):
         return None
     passes = _sizes(job, smaller.spp)
     return Progress.of(smaller, len(passes)) if _begins(job, passes) else None

@@ -22,7 +22,7 @@ from pathlib import Path
 from .atomic import explain
 from .cleaning import check_links, remove_leftovers
 from .errors import InputError
-from .manifest import check_name
+from .manifest import check_result_name
 
 try:
     import fcntl
@@ -49,7 +49,8 @@ def writing(folder: Path, part: str, alone: bool = False) -> Iterator[None]:
             is a link that leads outside.
     """
     if part.startswith(_RESULTS):
-        check_name(part[len(_RESULTS):], "method")
+        check_result_name(part[len(_RESULTS):],
+                          (path.name for path in folder.glob("denoised/*")))
     made = not folder.exists()
     try:
         with ExitStack() as held:

@@ -5,9 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, FiniteFloat, PlainSerializer, field_validator
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    PlainSerializer,
+    ValidationInfo,
+    field_validator,
+)
 
 from .channels import CHANNELS
 from .errors import InputError
@@ -62,18 +71,24 @@ Size = Annotated[int, Field(ge=1, le=1 << 16)]
 Name = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]+$")]
 
 
+_UNKNOWN = ("spp", "max_depth", "direct", "sampler", "reference_filter")  # of an import
+
+
 class Manifest(JsonFile):
     """What a sequence is, in `manifest.json`.
 
     `reference_spp` is the fewest samples that a reference has (while they are rendered: is to
     have), None where there is none; `reference_filter` is "centre" where samples go through pixel
     centres, as a frame's do, "box" where they are spread over the pixel.
-    `seed` and `max_depth` are None for imports, where they are not known. `objects` are names
-    in order of ID. `fingerprint` is a hash of what the scene describes (or an import holds), so
-    that an edited scene is not taken for the old one; `later` has hashes of frames after the
-    scene's last one, by their number. `commands` are the command lines that made
-    it, as they were typed, in order; `machine` is that of the first.
+    `seed`, `spp`, `max_depth`, `direct`, `sampler` and `reference_filter` are None for imports,
+    where nobody knows them (older versions wrote defaults there, which are not read). `objects`
+    are names in order of ID. `fingerprint` is a hash of what the scene describes (or an import
+    holds), so that an edited scene is not taken for the old one; `later` has hashes of frames
+    after the scene's last one, by their number. `commands` are the command lines that made it, as
+    they were typed, in order; `machine` is that of the first.
     """
+
+    model_config = ConfigDict(validate_default=True)
 
     format: Annotated[int, Field(ge=FORMAT, le=FORMAT)] = FORMAT
     source: Literal["render", "games202"] = "render"
@@ -85,12 +100,12 @@ class Manifest(JsonFile):
     height: Size
     fps: Annotated[FiniteFloat, Field(gt=0)] = 24.0
     seed: Annotated[int, Field(ge=0)] | None = 0
-    spp: Annotated[int, Field(ge=1)] = 1
+    spp: Annotated[int, Field(ge=1)] | None = 1
     reference_spp: Annotated[int, Field(ge=1)] | None = None
-    reference_filter: Literal["centre", "box"] = "centre"
+    reference_filter: Literal["centre", "box"] | None = "centre"
     max_depth: Annotated[int, Field(ge=1)] | None = None
-    direct: Name = "mis"
-    sampler: Name = "pcg"
+    direct: Name | None = "mis"
+    sampler: Name | None = "pcg"
     channels: Annotated[tuple[str, ...], Field(min_length=1)]
     objects: Annotated[tuple[Name, ...], Field(min_length=1)]
     fingerprint: str = ""
@@ -100,6 +115,11 @@ class Manifest(JsonFile):
     created: str = ""
     machine: str = ""
     commands: tuple[str, ...] = ()
+
+    @field_validator(*_UNKNOWN)
+    @classmethod
+    def _known_of_renders_only(cls, value: Any, info: ValidationInfo) -> Any:
+        return None if info.data.get("source") == "games202" else value
 
     @field_validator("channels")
     @classmethod
@@ -129,8 +149,11 @@ def first_difference(a: Manifest, b: Manifest) -> str | None:
 
 
 class Run(JsonFile):
-    """How a denoised result came to be, in `denoised/METHOD/run.json`.
+    """How a denoised result came to be, in `denoised/NAME/run.json`.
 
+    `method` is what ran, whatever the results are called: a name of `onespp denoise --list`,
+    `external` (the program is in `parameters`) or `files` (results taken as they were).
+    `changed` are those of the `parameters` that are not the method's defaults.
     `ms` holds milliseconds by frame number, reading and writing of files excluded; `first_ms`
     the first call's, compilation included; `peak_mb` the most memory that the calls took, in MiB.
     `energy_kept` is the share of the input's mean radiance that outlier removal let through.
@@ -139,6 +162,7 @@ class Run(JsonFile):
 
     method: Name
     parameters: dict[str, Any] = Field(default_factory=dict)
+    changed: dict[str, Any] = Field(default_factory=dict)
     device: str = ""
     threads: int | None = None
     versions: dict[str, str] = Field(default_factory=dict)
@@ -148,6 +172,29 @@ class Run(JsonFile):
     ms: dict[int, FiniteFloat] = Field(default_factory=dict)
     peak_mb: FiniteFloat | None = None
     energy_kept: FiniteFloat | None = None
+
+
+RESERVED = MappingProxyType({
+    "input": "tables call the noisy frames so", "reference": "tables call the ground truth so",
+    "all": "`--method all` means every method", "oidn": "`--method oidn` means its qualities"})
+"""Names that results cannot have, and why."""
+
+
+def check_result_name(name: str, others: Iterable[str] = ()) -> str:
+    """A name for results; InputError if it is none, is taken by tables, or hides another one.
+
+    Args:
+        others: names of the results that are there. Some file systems cannot tell a name from
+            one in other letters, small or capital, so no two may differ in that alone.
+    """
+    check_name(name, "method")
+    if why := RESERVED.get(name.lower()):
+        raise InputError(f"{name!r} cannot be the name of results, since {why}: use another --name")
+    same = [other for other in others if other.lower() == name.lower() and other != name]
+    if same:
+        raise InputError(f"there are results called {same[0]!r}, which some file systems take for "
+                         f"{name!r}: use another --name")
+    return name
 
 
 def check_name(name: str, what: str) -> str:

@@ -54,7 +54,7 @@ class Progress:
     @classmethod
     def of(cls, reference: Reference, passes: int) -> Progress:
         """What a finished reference amounts to, but for its rounding to float32."""
-        mean, samples = reference.color.astype(np.float64), reference.spp
+        mean, samples = reference.color.astype(np.float64), reference.spp or 0
         spread = reference.variance.astype(np.float64) * (passes - 1) * samples
         return cls(samples * mean, spread + samples * mean * mean, passes, samples)
 

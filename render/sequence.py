@@ -29,11 +29,11 @@ from .errors import InputError
 from .exr import read_exr, read_header, write_exr
 from .frame import Frame
 from .json_file import format_json, read_json
-from .manifest import Manifest, Run, check_name, first_difference
+from .manifest import Manifest, Run, check_result_name, first_difference
 from .matrices import format_matrices, read_matrices
 
 _HALF_MAX = float(np.finfo(np.float16).max)
-
+_UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,12 @@ class Reference:
 
     Attributes:
         color: (h, w, 3) float32, linear radiance. variance: (h, w, 3) float32, of that mean.
-        spp: samples a pixel.
+        spp: samples a pixel. Of a reference from elsewhere spp is None and the variance NaN.
     """
 
     color: np.ndarray
     variance: np.ndarray
-    spp: int
+    spp: int | None
 
 
 @dataclass(frozen=True)
@@ -162,8 +162,8 @@ class Sequence:
     def has_reference(self, i: int) -> bool:
         return self._path("reference", i).exists()
 
-    def reference_spp(self, i: int) -> int:
-        """Samples a pixel of a frame's reference."""
+    def reference_spp(self, i: int) -> int | None:
+        """Samples a pixel of a frame's reference, None where it came from elsewhere."""
         return self._spp(self._path("reference", i))
 
     def with_reference_spp(self) -> Sequence:
@@ -186,7 +186,7 @@ class Sequence:
         self._check(i)
         self._write(self._path("reference", i),
                     {"color": reference.color, "variance": reference.variance},
-                    {**(provenance or {}), "spp": str(reference.spp)})
+                    {**(provenance or {}), "spp": str(reference.spp or _UNKNOWN)})
 
     def has_partial(self, i: int) -> bool:
         return self._path("reference", i, "partial.npz").exists()
@@ -253,7 +253,7 @@ class Sequence:
         return self.folder / kind / f"{i:04d}.{suffix}"
 
     def _result_folder(self, method: str) -> Path:
-        return self.folder / "denoised" / check_name(method, "method")
+        return self.folder / "denoised" / check_result_name(method)
 
     def _result(self, method: str, i: int) -> Path:
         return self._result_folder(method) / f"{i:04d}.exr"
@@ -278,8 +278,10 @@ class Sequence:
             planes.update(zip(row.exr, np.moveaxis(np.atleast_3d(image), 2, 0)))
         write_exr(path, planes, header)
 
-    def _spp(self, path: Path) -> int:
+    def _spp(self, path: Path) -> int | None:
         text = read_header(path).attributes.get("spp", "")
+        if text == _UNKNOWN:
+            return None
         if not re.fullmatch(r"[1-9][0-9]{0,8}", text):
             raise InputError(f"{path} does not say its samples a pixel ('spp' in its header): "
                              "render the reference again")

@@ -91,7 +91,7 @@ def _read_partial(path: Path) -> None:
 
 
 def _games202(folder: Path) -> Path:
-    export_games202(small_sequence(folder / "s", (0,)), folder)
+    export_games202(make_report_sequence(folder / "s", 2), folder)
     return folder / "matrix_0.mat"
 
 

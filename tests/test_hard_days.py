@@ -234,11 +234,11 @@ def test_results_without_a_record_are_not_mixed_with_new_ones(tmp_path):
     """A killed run leaves results, and nothing that says of which parameters."""
     sequence = small_sequence(tmp_path)
     sequence.write_result("m", 1, small_frame()["color"])
-    _remove_stale(sequence, Run(method="m"))
+    _remove_stale(sequence, "m", Run(method="m"))
     assert not sequence.has_result("m", 1)
     sequence.write_result("m", 1, small_frame()["color"])
     sequence.write_run("m", Run(method="m"))
-    _remove_stale(sequence, Run(method="m"))
+    _remove_stale(sequence, "m", Run(method="m"))
     assert sequence.has_result("m", 1)
 
 

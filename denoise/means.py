@@ -1,0 +1,48 @@
+"""The number of a sequence: the mean over its frames, and which frames count.
+
+The PSNR of an image that is identical to its reference is infinite (`PSNR_CAP` stands for it): one
+such frame would decide a mean in dB alone. Hence for measures in dB
+
+- a frame where the input itself is identical, as a black one, is left out for every method:
+  there was nothing to denoise, and all methods keep being judged on the same frames;
+- any other frame where a method is identical is left out of that method's mean;
+- if no frame is left, all count.
+
+Measures in other units are finite there (relMSE 0, SSIM 1), and their means are over all frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from statistics import fmean
+
+from .metrics import PSNR_CAP, Metric
+
+_DECIBELS = "dB"
+
+
+def mean_over_frames(row: Metric, values: Mapping[int, float | None],
+                     untouched: Collection[int] = ()) -> float | None:
+    """Mean of a measure over frames; None if nothing was measured.
+
+    Args:
+        values: frame -> value. untouched: frames where the input is identical to the reference.
+    """
+    measured = {i: v for i, v in values.items() if v is not None}
+    if row.unit == _DECIBELS:
+        measured = {i: v for i, v in measured.items() if i not in untouched} or measured
+        measured = {i: v for i, v in measured.items() if v < PSNR_CAP} or measured
+    return fmean(measured.values()) if measured else None
+
+
+def mean_decibels(values: Iterable[float]) -> float:
+    """Mean of dB, without those of identical images unless there are no others."""
+    known = list(values)
+    return fmean([v for v in known if v < PSNR_CAP] or known)
+
+
+def identical(row: Metric, values: Mapping[int, float | None]) -> list[int]:
+    """The frames whose dB are infinite, so `PSNR_CAP`; none for a measure in another unit."""
+    if row.unit != _DECIBELS:
+        return []
+    return [i for i, v in values.items() if v is not None and v >= PSNR_CAP]
