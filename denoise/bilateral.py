@@ -54,7 +54,7 @@ class Bilateral(OnLanes):
         sigma_coord: falloff with distance on the screen [pixels, above 0].
         sigma_color: falloff with difference of colour, linear Rec. 709 [radiance, above 0].
         sigma_normal: falloff with the angle between normals [radians, above 0].
-        sigma_plane: falloff with the angle out of the tangent plane [sine of it, above 0].
+        sigma_plane: falloff with the sine of the angle out of the tangent plane [1, above 0].
         demodulate: filter colour over albedo, where frames have albedo.
         isolate_background: a pixel without a surface averages only such pixels. Otherwise it
             averages all (its normal and plane terms are 0), as the assignment's solutions do.

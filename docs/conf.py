@@ -6,9 +6,9 @@ import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+sys.path.insert(0, str(Path(__file__).parent))
 
-from from_code import filled  # noqa: E402 - found by the line above
+from from_code import filled
 
 project = "onespp"
 version = release = version_of("onespp")
@@ -24,8 +24,8 @@ nitpicky = True
 
 html_theme = "furo"
 html_title = "onespp"
-html_static_path: list[str] = []
-html_css_files: list[str] = []
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
 html_copy_source = False
 html_show_sourcelink = False
 

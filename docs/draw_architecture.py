@@ -70,7 +70,7 @@ def imports(name: str, path: Path, known: Iterable[str]) -> set[str]:
             wanted += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             base = package.split(".")[:len(package.split(".")) + 1 - node.level]
-            start = ".".join([*(base if node.level else []), *([node.module] if node.module else [])])
+            start = ".".join([*(base if node.level else []), *filter(None, [node.module])])
             wanted += [f"{start}.{alias.name}" for alias in node.names]
     return {module for name_ in wanted if (module := _module_of(name_, known))} - {name}
 
@@ -260,7 +260,8 @@ def svg(rooms: Mapping[str, Room]) -> str:
              f"<title>{len(rooms)} rooms and the imports between them, downwards</title>",
              f"<style>{STYLE}</style>",
              '<defs><marker id="head" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="6" '
-             'markerHeight="6" orient="auto"><path class="head" d="M0 0L8 4L0 8z"/></marker></defs>']
+             'markerHeight="6" orient="auto">',
+             '<path class="head" d="M0 0L8 4L0 8z"/></marker></defs>']
     for way in ways:
         points = [(x[p], y[p]) for p in way]
         path = f"M{points[0][0]:.0f} {y[way[0]] + height[str(way[0])]:.0f}"

@@ -83,11 +83,12 @@ def _parameter(name: str, value: Any, text: str) -> Parameter:
 
 
 def markdown_of(docstring: str) -> str:
-    """A module's docstring without its first line: what introduces a paragraph bold, DOIs linked."""
+    """A module's docstring without its first line; words that introduce paragraphs bold, DOIs linked.
+    """
     text = inspect.cleandoc(docstring).partition("\n")[2].strip("\n")
-    text = re.sub(r"^(Sources?|Departures[^:\n]*|Symbols|Form|Order):", r"**\1:**", text, flags=re.M)
-    text = re.sub(r"doi:(10\.[^\s,;)]*[^\s,;).:])", r"[doi:\1](https://doi.org/\1)", text)
-    return text
+    text = re.sub(r"^(Sources?|Departures[^:\n]*|Symbols|Form|Order):", r"**\1:**", text,
+                  flags=re.M)
+    return re.sub(r"doi:(10\.[^\s,;)]*[^\s,;).:])", r"[doi:\1](https://doi.org/\1)", text)
 
 
 def table(heads: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
@@ -100,10 +101,12 @@ def table(heads: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
 
 
 def parameter_table(method: Any) -> str:
-    return table(
-        ("parameter", "default", "range", "unit", "meaning"),
-        ((f"`{p.name}`", f"`{str(p.default).lower() if isinstance(p.default, bool) else p.default}`",
-          p.range, p.unit, p.about) for p in parameters(method)))
+    def typed(value: Any) -> str:
+        return str(value).lower() if isinstance(value, bool) else str(value)
+
+    return table(("parameter", "default", "range", "unit", "meaning"),
+                 ((f"`{p.name}`", f"`{typed(p.default)}`", p.range, p.unit, p.about)
+                  for p in parameters(method)))
 
 
 def first_sentence(cls: type) -> str:
@@ -128,7 +131,7 @@ def methods() -> str:
 
 def _section(anchor: str, title: str, cls: type, method: Any) -> str:
     module = sys.modules[cls.__module__].__doc__ or ""
-    return "\n\n".join([f"({anchor})=\n## {title}", first_sentence(cls), markdown_of(module),
+    return "\n\n".join([f"({anchor})=\n### {title}", first_sentence(cls), markdown_of(module),
                         parameter_table(method)])
 
 
@@ -144,7 +147,7 @@ def shared() -> str:
         open_ += [u for u in used if u.startswith("denoise.")]
         text = ast.get_docstring(ast.parse(paths[name].read_text("utf-8"))) or ""
         if name not in own and HEADER.search(text):
-            sections.append(f"## `{name.replace('.', '/')}.py`\n\n{text.splitlines()[0]}\n\n"
+            sections.append(f"### `{name.replace('.', '/')}.py`\n\n{text.splitlines()[0]}\n\n"
                             f"{markdown_of(text)}")
     return "\n\n".join(sections)
 
@@ -172,7 +175,8 @@ def metrics() -> str:
 
 
 def causes() -> str:
-    return table(("class", "pixels where"), ((f"`{name}`", about) for name, about in CAUSES.items()))
+    return table(("class", "pixels where"),
+                 ((f"`{name}`", about) for name, about in CAUSES.items()))
 
 
 def histories() -> str:
@@ -198,12 +202,13 @@ def commands() -> str:
     sections = []
     for path, command in walk(app):
         context = click.Context(command, info_name=f"onespp {path}")
-        arguments = " ".join(p.make_metavar(context) for p in command.params
-                             if isinstance(p, click.Argument))
+        arguments = [p.make_metavar(context) for p in command.params
+                     if isinstance(p, click.Argument)]
         rows = [tuple(found) for p in command.params if isinstance(p, click.Option)
                 and (found := p.get_help_record(context))]
         sections.append("\n\n".join([
-            f"### `onespp {path}`", f"`onespp {path} {arguments}`".replace(" `", "`"),
+            f"### `onespp {path}`",
+            *([f"`{' '.join(['onespp', path, *arguments])}`"] if arguments else []),
             " ".join((command.help or "").split()),
             table(("option", "what it does"), ((f"`{a}`", b.replace("[", r"\["))
                                                for a, b in rows)) if rows else "No options."]))

@@ -16,45 +16,42 @@ from __future__ import annotations
 
 import os
 import re
-import shlex
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import pairwise
 from pathlib import Path
 
 import click
 import numpy as np
 
+import onespp  # noqa: F401 - finds LLVM before anything imports Dr.Jit
+from denoise import hard as hard_study
+from denoise.ablation import ablate, variants
+from denoise.ablation import markdown as ablation_table
+from denoise.interleave import read_times, time_methods
+from denoise.lead import markdown as lead_table
+from denoise.methods import METHODS, Method, build, parameters
+from denoise.peers import PEERS
+from denoise.plot import plot_speed_against_error
+from denoise.score import score
+from denoise.scorecard import INPUT, MethodScore, Scores
+from denoise.stream import denoise_sequence
+from denoise.tonemap import TONE_MAP
+from render.arguments import parse_size
+from render.channels import REPLAY
+from render.command import use
+from render.errors import InputError
+from render.job import RenderJob, render_sequence
+from render.lock import writing
+from render.manifest import format_frames, parse_frames
+from render.sequence import Sequence as FrameSequence
+from render.terminal import run as run_command
+from scenes import catalog
+from scenes.hard import HARD
+
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-import onespp  # noqa: E402, F401 - finds LLVM before anything imports Dr.Jit
-from denoise import hard as hard_study  # noqa: E402
-from denoise.ablation import ablate, variants  # noqa: E402
-from denoise.ablation import markdown as ablation_table  # noqa: E402
-from denoise.interleave import read_times, time_methods  # noqa: E402
-from denoise.lead import markdown as lead_table  # noqa: E402
-from denoise.methods import METHODS, Method, build, parameters  # noqa: E402
-from denoise.peers import PEERS  # noqa: E402
-from denoise.plot import plot_speed_against_error  # noqa: E402
-from denoise.score import score  # noqa: E402
-from denoise.scorecard import INPUT, MethodScore, Scores  # noqa: E402
-from denoise.stream import denoise_sequence  # noqa: E402
-from denoise.tonemap import TONE_MAP  # noqa: E402
-from render.arguments import parse_size  # noqa: E402
-from render.channels import REPLAY  # noqa: E402
-from render.command import use  # noqa: E402
-from render.errors import InputError  # noqa: E402
-from render.job import RenderJob, render_sequence  # noqa: E402
-from render.lock import writing  # noqa: E402
-from render.manifest import format_frames, parse_frames  # noqa: E402
-from render.sequence import Sequence as FrameSequence  # noqa: E402
-from render.terminal import run as run_command  # noqa: E402
-from scenes import catalog  # noqa: E402
-from scenes.hard import HARD  # noqa: E402
-
-PLAIN = {"direct": "mis", "sampler": "pcg"}
+PLAIN, OURS = ("mis", "pcg"), ("resampled", "zsobol")  # --direct and --sampler
 SUMMARY = (INPUT, "atrous", "svgf", "oidn-high", "onespp")
 BEST, PEER, RATIO_TO = "onespp", "oidn-high", "oidn-fast"
 OTHERS = {  # label -> scene, frames, size, seed: scenes and frames that nothing was tuned on
@@ -108,12 +105,12 @@ class Plan:
 
     def sequence(self, scene: str, plain: bool = False) -> FrameSequence:
         """Frames and references of one of the two scenes; both inputs share the references."""
-        def rendered(name: str, given: Mapping[str, str],
+        def rendered(name: str, estimator: tuple[str, str],
                      like: FrameSequence | None = None) -> FrameSequence:
             return render(self.data / name, scene, self.frames, self.sizes[scene], self.spp,
-                          self.seed, given, like)
+                          self.seed, estimator, like)
 
-        ours = rendered(scene, {})
+        ours = rendered(scene, OURS)
         return rendered(f"{scene}_plain", PLAIN, ours) if plain else ours
 
     @cached_property
@@ -123,7 +120,7 @@ class Plan:
         for label, (scene, frames, size, seed) in OTHERS.items():
             name = f"other_{Path(scene).stem}"
             sequence = render(self.data / name, str(ROOT / scene) if scene.endswith(".py")
-                              else scene, frames, size, self.others_spp, seed, {})
+                              else scene, frames, size, self.others_spp, seed)
             known = all_methods(sequence)
             denoise(sequence, {m: known[m] for m in (BEST, PEER, "atrous") if m in known},
                     self.again)
@@ -138,7 +135,7 @@ class Plan:
         for name in self.hard:
             known, scene = HARD[name], HARD[name].make()
             sequence = render(self.data / "hard" / name, f"hard/{name}", f"0:{scene.frames}",
-                              f"{scene.width}x{scene.height}", self.hard_spp, 0, {}, None, needed)
+                              f"{scene.width}x{scene.height}", self.hard_spp, 0, added=needed)
             say(f"hard/{name}: judge")
             rows += hard_study.judge(sequence, name, known.event, known.diffuse)
         return rows
@@ -149,14 +146,15 @@ def say(text: str) -> None:
 
 
 def render(folder: Path, scene_name: str, frames: str, size: str, spp: int, seed: int,
-           given: Mapping[str, str], like: FrameSequence | None = None,
+           estimator: tuple[str, str] = OURS, like: FrameSequence | None = None,
            added: Iterable[str] = REPLAY) -> FrameSequence:
     """Render what is missing; references are copied from `like`, which has the same ones."""
     scene = catalog.load(scene_name)
     height, width = parse_size(size)
+    direct, sampler = estimator
+    command = command_of(scene_name, frames, size, spp, seed, direct, sampler)
     job = RenderJob(scene, parse_frames(frames), height, width, seed=seed, reference_spp=spp,
-                    added=tuple(added), command=command_of(scene_name, frames, size, spp, seed,
-                                                           given), **given)
+                    added=tuple(added), direct=direct, sampler=sampler, command=command)
     say(f"{folder.name}: render {frames} at {size}, reference {spp} spp")
     with writing(folder, "render"):
         if like is not None:
@@ -167,13 +165,12 @@ def render(folder: Path, scene_name: str, frames: str, size: str, spp: int, seed
         return render_sequence(job, folder)
 
 
-def command_of(scene: str, frames: str, size: str, spp: int, seed: int,
-               given: Mapping[str, str]) -> str:
+def command_of(scene: str, frames: str, size: str, spp: int, seed: int, direct: str,
+               sampler: str) -> str:
     """The command line that renders the same."""
     scene = os.path.relpath(scene, ROOT) if scene.endswith(".py") else scene
-    options = "".join(f" --{name} {value}" for name, value in given.items())
     return (f"onespp render {scene} --frames {frames} --size {size} --reference-spp {spp} "
-            f"--seed {seed} --channels +gradient{options}")
+            f"--seed {seed} --channels +gradient --direct {direct} --sampler {sampler}")
 
 
 def all_methods(sequence: FrameSequence) -> dict[str, Method]:
@@ -240,11 +237,19 @@ def named(name: str) -> str:
     return "input, 1 spp" if name == INPUT else f"**`{name}`**" if name == BEST else f"`{name}`"
 
 
+def frames_text(frames: list[int]) -> str:
+    """Frames as one would type them: 0:30, or 60:92:2 for every second."""
+    steps = {b - a for a, b in pairwise(frames)}
+    if len(steps) == 1 and (step := steps.pop()) > 1:
+        return f"{frames[0]}:{frames[-1] + step}:{step}"
+    return format_frames(frames)
+
+
 def conditions(scores: Scores) -> str:
     """What numbers of a sequence stand on, with the score of its own input."""
     floor = scores.reference_floor_db
     noisy = scores.methods[INPUT]["psnr_srgb"]
-    return (f"`{scores.scene}`: frames {format_frames(scores.frames)} at {scores.size[0]}x"
+    return (f"`{scores.scene}`: frames {frames_text(scores.frames)} at {scores.size[0]}x"
             f"{scores.size[1]}, reference {scores.reference_spp} spp (noise floor "
             + (f"{floor:.1f} dB" if floor is not None else "not known")
             + f"), seed {scores.seed}, input "
@@ -297,8 +302,8 @@ def all_scores(plan: Plan) -> str:
     first = next(iter(ratios.values()))
     lines = [f"{conditions(ours)} (plain {number(plain.methods[INPUT], 'psnr_srgb', '.2f')} dB)"
              for plain, ours in plan.pairs.values()]
-    return (f"{table(heads, rows)}\n\nPSNR in dB on {TONE_MAP}, mean over frames; FLIP, flicker and "
-            f"time on our input. {'; '.join(lines)}; {machine_of(plan)}"
+    return (f"{table(heads, rows)}\n\nPSNR in dB on {TONE_MAP}, mean over frames; FLIP, flicker "
+            f"and time on our input. {'; '.join(lines)}; {machine_of(plan)}"
             + (f"; ratio: median ratio to `{first.ratio_to}`, step by step." if first else "."))
 
 
@@ -444,4 +449,4 @@ def results(parts: str, frames: str, box_size: str, room_size: str, reference_sp
 
 
 if __name__ == "__main__":
-    run_command(results, name=shlex.join(["python", "docs/results.py"]))
+    run_command(results, name="python docs/results.py")
