@@ -1,4 +1,4 @@
-# Everything in two commands: `make demo` and `make test`. Without make: see README.md.
+# Everything in two commands: `make demo` and `make test`. Without make: see docs/index.md.
 PYTHON ?= python3
 BIN := .venv/bin
 ifeq ($(OS),Windows_NT)

@@ -168,7 +168,12 @@ def non_finite(image: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Pair:
-    """An image and its reference, fit for the measures: `linear` and `srgb` are both (a, b)."""
+    """An image and its reference, fit for the measures.
+
+    Attributes:
+        linear: (a, b), (h, w, 3) linear radiance.
+        srgb: (a, b), (h, w, 3) display values in [0, 1].
+    """
 
     linear: tuple[np.ndarray, np.ndarray]
     srgb: tuple[np.ndarray, np.ndarray]

@@ -316,7 +316,7 @@ def rooms_table(rooms: Mapping[str, Room]) -> str:
     level = layers(rooms)
     titles = {key: f"`{room.title}`" + (" (upper files)" if key.endswith("^") else "")
               for key, room in rooms.items()}
-    lines = ["| room | what it is for | files | lines | imports |",
+    lines = ["| folder | what it is for | files | lines | imports |",
              "| --- | --- | --- | --- | --- |"]
     for key in sorted(rooms, key=lambda k: (-level[k], k)):
         room = rooms[key]

@@ -83,8 +83,7 @@ def _parameter(name: str, value: Any, text: str) -> Parameter:
 
 
 def markdown_of(docstring: str) -> str:
-    """A module's docstring without its first line; words that introduce paragraphs bold, DOIs linked.
-    """
+    """A module's docstring without its first line, words before a colon bold, DOIs linked."""
     text = inspect.cleandoc(docstring).partition("\n")[2].strip("\n")
     text = re.sub(r"^(Sources?|Departures[^:\n]*|Symbols|Form|Order):", r"**\1:**", text,
                   flags=re.M)

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 
 import click
+import draw_architecture
 import from_code
 import pytest
 import results
@@ -130,6 +131,53 @@ def test_what_is_made_from_the_code_is_in_the_pages(site):
     assert "replay_before" in text["files"]
     assert "hard/switched-off" in text["scenes"]
     assert "--reference-spp" in text["commands"]
+
+
+@pytest.fixture
+def house(tmp_path) -> Path:
+    """A source tree: `render/job` above the tracer, `render/frame` below it."""
+    for name, text in {
+            "render/__init__": '"""Frames."""', "render/frame": "x = 1",
+            "render/job": "from render.tracer.path import y\nfrom .frame import x",
+            "render/tracer/__init__": '"""Light, traced."""',
+            "render/tracer/path": "from ..frame import x\ndef f(): import scenes.box",
+            "scenes/box": "import os", "denoise/catalog": "from onespp.render import frame",
+            "denoise/cli/main": "from .. import catalog\nimport onespp.render.frame"}.items():
+        path = tmp_path / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text + "\n")
+    return tmp_path
+
+
+def test_rooms_are_folders_and_imports_between_them(house):
+    found = draw_architecture.rooms(house)
+    assert {key: (room.files, room.below) for key, room in found.items()} == {
+        "render^": (["job"], {"render/tracer", "render"}), "render": (["frame"], set()),
+        "render/tracer": (["path"], {"render", "scenes"}), "scenes": (["box"], set()),
+        "denoise": (["catalog"], {"render"}), "denoise/cli": (["main"], {"denoise", "render"})}
+    assert found["render/tracer"].about == "Light, traced."
+    assert draw_architecture.reduced(found) == [
+        ("denoise", "render"), ("denoise/cli", "denoise"), ("render/tracer", "render"),
+        ("render/tracer", "scenes"), ("render^", "render/tracer")]
+    assert draw_architecture.circles(found) == []
+
+
+def test_a_circle_is_found_and_drawn_as_wrong(house):
+    (house / "scenes/box.py").write_text("import render.job\n")
+    found = draw_architecture.rooms(house)
+    assert ("render^", "scenes") in draw_architecture.circles(found)
+    assert draw_architecture.svg(found).count(" wrong") == 3
+    assert " wrong" not in draw_architecture.svg(draw_architecture.rooms(ROOT))
+
+
+def test_arrows_go_down_and_rooms_do_not_overlap(house):
+    for found in (draw_architecture.rooms(house), draw_architecture.rooms(ROOT)):
+        level = draw_architecture.layers(found)
+        assert all(level[key] > level[below] for key, room in found.items() for below in room.below)
+        rows, x, _ = draw_architecture.arrange(found)
+        for row in rows:
+            for a, b in pairwise([x[p] for p in row if isinstance(p, str)]):
+                assert b - a >= draw_architecture.ROOM_WIDTH
 
 
 def slugs(page: Path) -> set[str]:
@@ -288,7 +336,7 @@ def check_settings(words: list[str]) -> None:
 
 def test_a_misspelt_command_line_is_noticed():
     lines = ("onespp scor data/room", "onespp score --pictuers data/room", "make dmeo",
-                 "onespp denoise data/room --set levls=3", "python docs/results.py --spp 3")
+             "onespp denoise data/room --set levls=3", "python docs/results.py --spp 3")
     for line in lines:
         with pytest.raises(AssertionError):
             check_command([str(word) for word in line.split()])
