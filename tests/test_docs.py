@@ -26,11 +26,11 @@ import denoise.lead
 import onespp
 import render.bench
 from denoise.methods import METHODS, build, parameters
-from denoise.metrics import METRICS
 from denoise.outliers import RemoveOutliers
 from denoise.parameters import pairs
 from denoise.peers import PEERS
 from denoise.score import score
+from denoise.stability import MEASURES
 from denoise.tonemap import srgb_from_linear
 from render.errors import InputError
 
@@ -379,7 +379,7 @@ def bounds(range_: str) -> tuple[list[float], list[float]]:
 
 def modules() -> list[ModuleType]:
     """Those whose public examples run: of the methods and of the metrics."""
-    things = [*METHODS.values(), RemoveOutliers, *(m.function for m in METRICS.values()),
+    things = [*METHODS.values(), RemoveOutliers, *(m.function for m in MEASURES.values()),
               srgb_from_linear]
     return [sys.modules[name] for name in dict.fromkeys(t.__module__ for t in things)]
 
