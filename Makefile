@@ -1,11 +1,11 @@
-# Everything in two commands: `make demo` and `make test`. Without make: see README.md.
+# Everything in two commands: `make demo` and `make test`. Without make: see docs/index.md.
 PYTHON ?= python3
 BIN := .venv/bin
 ifeq ($(OS),Windows_NT)
 BIN := .venv/Scripts
 endif
 
-.PHONY: demo test lint slow clean
+.PHONY: demo test lint slow docs results clean
 
 demo: .venv/installed
 	$(BIN)/onespp run box --frames 0:8 --size 192x192 --reference-spp 256 --out data/demo \
@@ -22,6 +22,15 @@ lint: .venv/installed-dev
 slow: .venv/installed-dev
 	$(BIN)/python -m pytest -m slow
 
+docs: .venv/installed-docs
+	$(BIN)/python -m sphinx -E -W --keep-going -q -b html docs build/docs
+	@echo "Look at build/docs/index.html."
+
+# All tables of README.md and docs/results.md. It renders references first, which takes hours, and
+# resumes. `make results ARGS=--write` writes the tables into the two files.
+results: .venv/installed-dev
+	$(BIN)/python docs/results.py $(ARGS)
+
 .venv/installed: pyproject.toml
 	test -d .venv || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --editable .
@@ -30,6 +39,11 @@ slow: .venv/installed-dev
 .venv/installed-dev: pyproject.toml
 	test -d .venv || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	touch $@ .venv/installed
+
+.venv/installed-docs: pyproject.toml
+	test -d .venv || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
 	touch $@ .venv/installed
 
 clean:

@@ -1,6 +1,10 @@
 """The GAMES202 assignment: filter each frame, then accumulate the filtered frames.
 
 Order: filter, reproject, clamp the history to the filtered frame's statistics, blend.
+
+Source: GAMES202, "Real-time high quality rendering" (Yan 2021), assignment 5.
+
+Departures: those of the two stages (`bilateral.py` or `atrous.py`, and `temporal.py`).
 """
 
 from __future__ import annotations
@@ -49,7 +53,18 @@ class _Filtered(OnLanes):
 
 @dataclass(frozen=True)
 class Assignment(_Filtered):
-    """Joint bilateral filter, then clamped accumulation: the assignment as set."""
+    """Joint bilateral filter, then clamped accumulation: the assignment as set.
+
+    Attributes:
+        filter: the first stage, a `Bilateral`.
+        history: the second stage, a `Temporal`.
+
+    Example, with `frame` a `Frame` of 12x16 pixels:
+        >>> method = Assignment(filter=Bilateral(radius=4))
+        >>> image, state = method(frame, method.init(12, 16))
+        >>> image.shape, image.dtype
+        ((12, 16, 3), dtype('float32'))
+    """
 
     filter: Bilateral = field(default_factory=Bilateral)
     history: Temporal = field(default_factory=Temporal)
@@ -57,7 +72,18 @@ class Assignment(_Filtered):
 
 @dataclass(frozen=True)
 class AssignmentAtrous(_Filtered):
-    """A-trous filter, then clamped accumulation: the assignment's bonus task, done as published."""
+    """A-trous filter, then clamped accumulation: the assignment's bonus task, done as published.
+
+    Attributes:
+        filter: the first stage, an `Atrous`.
+        history: the second stage, a `Temporal`.
+
+    Example, with `frame` a `Frame` of 12x16 pixels:
+        >>> method = AssignmentAtrous(history=Temporal(alpha=0.1))
+        >>> image, state = method(frame, method.init(12, 16))
+        >>> image.shape, image.dtype
+        ((12, 16, 3), dtype('float32'))
+    """
 
     filter: Atrous = field(default_factory=Atrous)
     history: Temporal = field(default_factory=Temporal)

@@ -8,9 +8,9 @@ over strata, {1/16, 1/4, 3/8, 1/4, 1/16}^2 at steps 1, 2, 4, ...
 
 of direct and indirect light each, and `moments.py` says what lambda does to their histories.
 
-Source: Schied et al. 2018, "Gradient estimation for real-time adaptive temporal filtering".
-Defaults of alpha and length are Quake II RTX's; those of the gradient's filter were chosen on
-twelve frames each of box and room that no table reports.
+Source: Schied, Peters and Dachsbacher 2018, "Gradient estimation for real-time adaptive temporal
+filtering", doi:10.1145/3233301. Defaults of alpha and history length are Quake II RTX's; those of
+the gradient filter were chosen on twelve frames each of box and room that no table reports.
 
 Departures:
 - F has no edge weights: a change of light beside an object reaches a few pixels of it as well.
@@ -45,10 +45,19 @@ _LEAST = 1e-6        # radiance; darker samples say nothing
 class Asvgf(Svgf):
     """SVGF with an adaptive weight of history, by gradients over time (A-SVGF).
 
+    Frames need the channels `replay` and `replay_before` (render with `--channels +gradient`).
+
     Attributes: those of `Svgf` (`alpha` is that of direct light), and
-        alpha_indirect: least weight of the current frame in indirect light.
-        gradient_levels: 1 to 8, of the filter of gradients.
-        gradient_scale: relative change of shading that discards history is 1 over this.
+        alpha_indirect: least weight of the current frame in indirect light [1, 1e-6 to 1].
+        gradient_levels: levels of the gradients' a-trous filter [1, 1 to 8].
+        gradient_scale: inverse of the relative change of shading that discards all history
+            [1, above 0].
+
+    Example, with `frame` a `Frame` of 12x16 pixels:
+        >>> method = Asvgf(gradient_scale=2.0)
+        >>> image, state = method(frame, method.init(12, 16))
+        >>> image.shape, image.dtype
+        ((12, 16, 3), dtype('float32'))
     """
 
     alpha: float = 0.02

@@ -13,7 +13,9 @@ with g3x3 the binomial {1, 2, 1}^2 / 16. The first variance is that of l over a 
 on p's plane, since one frame has no history. Colour is filtered without texture (demodulation.py)
 where the frame has albedo.
 
-Sources: Dammertz et al. 2010; Schied et al. 2017 (SVGF), sigma_luminance 4, normal_power 128.
+Sources: Dammertz et al. 2010, "Edge-avoiding a-trous wavelet transform for fast global
+illumination filtering", doi:10.2312/EGGH/HPG10/067-075; Schied et al. 2017 (SVGF),
+doi:10.1145/3105762.3105770: sigma_luminance 4, normal_power 128.
 
 Departures from SVGF:
 - Its depth term uses the depth's screen-space gradient by finite differences. Over a plane 1/z is
@@ -57,13 +59,20 @@ _BACKGROUND_SCALE = 1e3  # |k| / sigma_plane of background, whose like alone cou
 
 @dataclass(frozen=True)
 class Atrous(OnLanes):
-    """A-trous filter of each frame by itself.
+    """A-trous filter of each frame on its own.
 
     Attributes:
-        levels: 1 to 8; the last one's taps lie 2^(levels - 1) pixels apart.
-        sigma_luminance: in deviations. sigma_plane: distance from the tangent plane over depth.
-        normal_power: exponent of the cosine between normals.
-        demodulate: filter colour over albedo, where the frame has albedo.
+        levels: wavelet levels; taps of the last are 2^(levels - 1) pixels apart [1, 1 to 8].
+        sigma_luminance: falloff with difference of luminance [standard deviations, above 0].
+        sigma_plane: falloff with distance from the tangent plane [share of depth, above 0].
+        normal_power: exponent of the cosine between normals [1, above 0].
+        demodulate: filter colour over albedo, where frames have albedo.
+
+    Example, with `frame` a `Frame` of 12x16 pixels:
+        >>> method = Atrous(levels=3)
+        >>> image, state = method(frame, method.init(12, 16))
+        >>> image.shape, image.dtype
+        ((12, 16, 3), dtype('float32'))
     """
 
     levels: int = 5

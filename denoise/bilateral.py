@@ -1,15 +1,19 @@
 """Joint bilateral filter of the GAMES202 assignment.
 
-J(i, j) = exp(-|i - j|^2 / 2 sp^2 - |Ci - Cj|^2 / 2 sc^2 - acos^2(ni . nj) / 2 sn^2
-              - (ni . (Pj - Pi) / |Pj - Pi|)^2 / 2 sd^2)
+    J(i, j) = exp(-|i - j|^2 / 2 sp^2 - |Ci - Cj|^2 / 2 sc^2 - acos^2(ni . nj) / 2 sn^2
+                  - (ni . (Pj - Pi) / |Pj - Pi|)^2 / 2 sd^2)
 
 i, j pixels on the screen; C colour, n normal, P position; sp = sigma_coord (pixels), sc =
 sigma_color, sn = sigma_normal (radians), sd = sigma_plane. The result is the mean of Cj over a
-square window, weighed by J; the weight of i itself is 1, so that it never divides by 0.
+square window, weighted by J; the weight of i itself is 1, so the sum of weights is never 0.
 
-What the formula leaves open: only pixels inside the image count. The plane term of a pixel with
-itself is 0. Two pixels without a surface (background, missing normal) have normal and plane
-terms of 0; one with and one without a surface have weight 0, so that neither bleeds.
+Sources: Petschnigg et al. 2004, "Digital photography with flash and no-flash image pairs",
+doi:10.1145/1015706.1015777 (the joint bilateral filter); GAMES202, assignment 5 (J, defaults).
+
+Departures, where the assignment leaves the formula open: only pixels inside the image count. The
+plane term of a pixel with itself is 0. Two pixels without a surface (background, missing normal)
+have normal and plane terms of 0; one with and one without a surface have weight 0, so that neither
+bleeds into the other.
 
 Form: one kernel for a row of taps, launched once for each row of the window. All terms are summed
 into one exponent of 2. acos^2(1 - t) is t times a quadratic, exact to 2e-4 for small angles and to
@@ -43,15 +47,23 @@ _TINY = 1e-30     # |Pj - Pi|^2 of a pixel and itself
 
 @dataclass(frozen=True)
 class Bilateral(OnLanes):
-    """Joint bilateral filter of each frame by itself.
+    """Joint bilateral filter of each frame on its own.
 
     Attributes:
-        radius: of the window, pixels (another one compiles another kernel).
-        sigma_coord: pixels. sigma_color: radiance. sigma_normal: radians. sigma_plane: sine of
-            an angle.
-        demodulate: filter colour over albedo, where the frame has albedo.
-        isolate_background: a pixel without a surface takes from its like alone. Otherwise it takes
-            from all (its normal and plane terms are 0), as in the assignment's solutions.
+        radius: half width of the square window [pixels, 1 to 64]; each value compiles a kernel.
+        sigma_coord: falloff with distance on the screen [pixels, above 0].
+        sigma_color: falloff with difference of colour, linear Rec. 709 [radiance, above 0].
+        sigma_normal: falloff with the angle between normals [radians, above 0].
+        sigma_plane: falloff with the sine of the angle out of the tangent plane [1, above 0].
+        demodulate: filter colour over albedo, where frames have albedo.
+        isolate_background: a pixel without a surface averages only such pixels. Otherwise it
+            averages all (its normal and plane terms are 0), as the assignment's solutions do.
+
+    Example, with `frame` a `Frame` of 12x16 pixels:
+        >>> method = Bilateral(radius=4, sigma_color=1.0)
+        >>> image, state = method(frame, method.init(12, 16))
+        >>> image.shape, image.dtype
+        ((12, 16, 3), dtype('float32'))
     """
 
     radius: int = 16

@@ -1,7 +1,8 @@
 """FLIP, the difference a viewer sees when flipping between two images, by NVIDIA's own library.
 
-LDR-FLIP (Andersson et al. 2020) takes display values; HDR-FLIP (Andersson et al. 2021) takes
-radiance, and is the greatest LDR-FLIP over a range of exposures with the ACES tone map. Both are
+LDR-FLIP (Andersson et al. 2020, doi:10.1145/3406183) takes display values; HDR-FLIP (Andersson et
+al. 2021, doi:10.2312/egs.20211015) takes radiance, and is the greatest LDR-FLIP over a range of
+exposures with the ACES tone map. Both are
 in [0, 1], 0 for equal images, at 67 pixels per degree (the library's default: a 0.7 m wide
 display of 3840 pixels at 0.7 m). Without `flip-evaluator` there are no such scores.
 
@@ -31,7 +32,12 @@ def flip_map(image: np.ndarray, reference: np.ndarray) -> np.ndarray:
 
 
 def flip(image: np.ndarray, reference: np.ndarray) -> float:
-    """Mean LDR-FLIP of display values."""
+    """Mean LDR-FLIP of two (h, w, 3) images of display values in [0, 1]; 0 for equal images.
+
+    Example:
+        >>> flip(np.zeros((8, 8, 3), np.float32), np.zeros((8, 8, 3), np.float32))
+        0.0
+    """
     return float(_evaluate(image, reference, "LDR", {})[1])
 
 

@@ -25,34 +25,74 @@ RELMSE_FLOOR = SMAPE_FLOOR = 0.01
 
 
 def mse(a: np.ndarray, b: np.ndarray) -> float:
-    """mean((a - b)^2)."""
+    """Mean squared error, mean((a - b)^2), of any space.
+
+    Example:
+        >>> mse(np.zeros((2, 2, 3)), np.full((2, 2, 3), 0.5))
+        0.25
+    """
     return float(np.mean(np.square(np.subtract(a, b, dtype=np.float64))))
 
 
 def decibels(error: float) -> float:
-    """-10 log10(error), the PSNR of a mean squared error with peak 1, at most `PSNR_CAP`."""
+    """-10 log10(error), the PSNR of a mean squared error with peak 1, at most `PSNR_CAP`.
+
+    Example:
+        >>> decibels(0.001), decibels(0.0)
+        (30.0, 150.0)
+    """
     return float(min(PSNR_CAP, -10 * np.log10(error))) if error > 0 else PSNR_CAP
 
 
 def psnr(a: np.ndarray, b: np.ndarray) -> float:
-    """Peak signal-to-noise ratio in dB, peak 1: 10 log10(1 / mse(a, b))."""
+    """Peak signal-to-noise ratio in dB, peak 1: 10 log10(1 / mse(a, b)).
+
+    Args:
+        a, b: (h, w, 3) display values in [0, 1].
+    Example:
+        >>> round(psnr(np.full((4, 4, 3), 0.5), np.full((4, 4, 3), 0.6)), 6)
+        20.0
+    """
     return decibels(mse(a, b))
 
 
 def relmse(a: np.ndarray, b: np.ndarray) -> float:
-    """mean((a - b)^2 / (b^2 + 0.01)), linear (Rousselle et al. 2011)."""
+    """Relative mean squared error, mean((a - b)^2 / (b^2 + 0.01)), of linear radiance.
+
+    Source: Rousselle et al. 2011, "Adaptive sampling and reconstruction using greedy error
+    minimization", ACM TOG 30 (6), article 159.
+
+    Example:
+        >>> round(relmse(np.full((2, 2, 3), 1.0), np.full((2, 2, 3), 2.0)), 4)
+        0.2494
+    """
     b = np.asarray(b, np.float64)
     return float(np.mean((a - b) ** 2 / (b ** 2 + RELMSE_FLOOR)))
 
 
 def smape(a: np.ndarray, b: np.ndarray) -> float:
-    """mean(|a - b| / (|a| + |b| + 0.01)), linear, in [0, 1] (Vogels et al. 2018)."""
+    """Symmetric mean absolute percentage error of linear radiance, as a share in [0, 1].
+
+        mean(|a - b| / (|a| + |b| + 0.01))
+
+    Source: Vogels et al. 2018, "Denoising with kernel prediction and asymmetric loss functions",
+    doi:10.1145/3197517.3201388.
+
+    Example:
+        >>> round(smape(np.full((2, 2, 3), 1.0), np.full((2, 2, 3), 3.0)), 4)
+        0.4988
+    """
     a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
     return float(np.mean(np.abs(a - b) / (np.abs(a) + np.abs(b) + SMAPE_FLOOR)))
 
 
 def energy_error(a: np.ndarray, b: np.ndarray) -> float | None:
-    """|mean(a) / mean(b) - 1|, linear; None for a black reference."""
+    """|mean(a) / mean(b) - 1| of linear radiance; None for a black reference.
+
+    Example:
+        >>> energy_error(np.full((2, 2, 3), 0.75), np.ones((2, 2, 3)))
+        0.25
+    """
     mean = np.mean(b, dtype=np.float64)
     return float(abs(np.mean(a, dtype=np.float64) / mean - 1)) if mean > 0 else None
 
@@ -63,14 +103,17 @@ class Metric:
 
     Attributes:
         name: key in scores.json and column in scores.csv.
-        label: heading in tables; `unit` goes with it ("" where there is none).
+        label: heading in tables.
         function: (a, b) -> float, finite for finite images; None where it does not apply.
-        space: "linear" or "srgb", what `function` takes; "step": see `stability.py`.
+        space: what `function` takes, "linear" radiance, "srgb" display values, or a "step" of two
+            frames (`stability.py`).
+        unit: goes with the label, as "dB"; "" where there is none.
         higher_is_better: the direction.
         format: how tables print it.
         about: the definition in a line.
         in_table: whether it has a column on the terminal; the files have them all.
-        most_frames: it is slow, and measured on that many frames, spread evenly; None: on all.
+        most_frames: for a slow one, the number of frames it is measured on, spread evenly; None:
+            all.
     """
 
     name: str
@@ -126,7 +169,12 @@ def non_finite(image: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Pair:
-    """An image and its reference, fit for the measures: `linear` and `srgb` are both (a, b)."""
+    """An image and its reference, fit for the measures.
+
+    Attributes:
+        linear: (a, b), (h, w, 3) linear radiance.
+        srgb: (a, b), (h, w, 3) display values in [0, 1].
+    """
 
     linear: tuple[np.ndarray, np.ndarray]
     srgb: tuple[np.ndarray, np.ndarray]
@@ -148,6 +196,10 @@ def measure(image: np.ndarray, reference: np.ndarray) -> dict[str, float | None]
 
     Args:
         image, reference: (h, w, 3) linear radiance, repaired as by `pair`.
+    Example:
+        >>> scores = measure(np.full((16, 16, 3), 0.2), np.full((16, 16, 3), 0.25))
+        >>> round(scores["psnr_srgb"], 2), round(scores["energy_error"], 2)
+        (25.59, 0.2)
     """
     return measure_pair(pair(image, reference), METRICS)
 
@@ -179,6 +231,9 @@ def reference_floor(reference: np.ndarray, variance: np.ndarray, nodes: int = 5)
     Returns:
         dB, at most `PSNR_CAP`. Where most pixels of a reference are uncertain by 20 % and more,
         b's own noise makes it off by up to 0.5 dB.
+    Example:
+        >>> round(reference_floor(np.full((4, 4, 3), 0.5), np.full((4, 4, 3), 1e-4)), 1)
+        43.6
     """
     x, weights = np.polynomial.hermite_e.hermegauss(nodes)
     b = blacken(reference, non_finite(reference))

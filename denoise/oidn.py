@@ -36,10 +36,10 @@ class Oidn:
     """Intel Open Image Denoise on every frame by itself.
 
     Attributes:
-        quality: high, balanced or fast.
-        auxiliary: clean, or noisy: whether the network may trust albedo and normal (ours have
-            no noise), or filters them as it does the colour.
-        emission_apart: take the emission out, where a frame has it.
+        quality: of the network [high, balanced or fast].
+        auxiliary: whether the network may trust albedo and normal (ours have no noise), or
+            filters them as it does the colour [clean or noisy].
+        emission_apart: take emission out before and add it after, where frames have it.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("color", "normal", "id")

@@ -11,11 +11,11 @@ colour without emission; visibility loses the share that direct light loses. A r
 ("firefly") is energy that belongs to its neighbours as well, so what is cut off darkens the image:
 `Cleaned.energy_kept` says by how much.
 
-Source: GAMES202, lecture 13, outlier removal: a window of 7x7 or 5x5, mu -+ k sigma.
+Source: GAMES202 (Yan 2021), lecture 13, outlier removal: a window of 7x7 or 5x5, mu -+ k sigma.
 
-Departures: the pixel itself is no part of mu and sigma (in a 5x5 window it could never be farther
-than 4.8 sigma from a mean that counts it), neither is another surface; with fewer than
-`FEWEST` neighbours nothing changes.
+Departures: the pixel itself does not count towards mu and sigma (in a 5x5 window it could never be
+farther than 4.8 sigma from a mean that includes it), nor do other surfaces; with fewer than
+`FEWEST` neighbours the pixel is left as it is.
 """
 
 from __future__ import annotations
@@ -41,11 +41,19 @@ _PARTS = ("direct", "indirect", "specular")
 
 @dataclass(frozen=True)
 class RemoveOutliers:
-    """The stage.
+    """Outlier removal: the stage before a method.
 
     Attributes:
-        outlier_width: k, in deviations. outlier_radius: of the window, 1 to 8 pixels.
-        outlier_plane: distance from the tangent plane over depth within which a pixel counts.
+        outlier_width: k, half width of the clamp [standard deviations, above 0].
+        outlier_radius: half width of the square window [pixels, 1 to 8].
+        outlier_plane: largest distance of a neighbour from the tangent plane
+            [share of depth, above 0].
+
+    Example, with `frame` a `Frame` of 12x16 pixels:
+        >>> stage = RemoveOutliers(outlier_width=2.0)
+        >>> cleaned, state = stage(frame, stage.init(12, 16))
+        >>> bool(cleaned["color"].max() <= frame["color"].max())
+        True
     """
 
     outlier_width: float = 3.0
@@ -161,7 +169,12 @@ def clamp(offsets: list[Offset], signal: Taps, guides: Taps, center: list[Float]
 
 @dataclass(frozen=True)
 class WithoutOutliers:
-    """A method that is given frames without outliers."""
+    """A method that gets frames whose outliers were removed.
+
+    Attributes:
+        method: any method.
+        outliers: the stage before it, a `RemoveOutliers`.
+    """
 
     method: Any
     outliers: RemoveOutliers = field(default_factory=RemoveOutliers)

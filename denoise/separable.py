@@ -8,10 +8,13 @@ the mean over a column of what the first gave:
 
 2 (2 radius + 1) taps instead of (2 radius + 1)^2: 66 instead of 1089 at radius 16.
 
-Departures from the joint bilateral filter: J is no product of a term in x and one in y, so
-the result is another: a pixel takes only from pixels that a row and a column join without crossing
-an edge. The second pass's colour term compares filtered colours, which have less noise, so that
-it keeps more of the taps that the noise would have put off, and fewer across an edge.
+Source: Pham and van Vliet 2005, "Separable bilateral filtering for fast video preprocessing",
+doi:10.1109/ICME.2005.1521458.
+
+Departures from the joint bilateral filter: J does not factor into a term in x and one in y, so the
+result differs: a pixel averages only pixels that a row and a column connect without crossing an
+edge. The second pass compares filtered colours, which have less noise: it keeps more of the taps
+that noise would have rejected, and fewer across an edge.
 """
 
 from __future__ import annotations
@@ -33,6 +36,12 @@ class BilateralSeparable(Bilateral):
     """Joint bilateral filter in two passes, rows, then columns: the cheaper form.
 
     Attributes: those of `Bilateral`.
+
+    Example, with `frame` a `Frame` of 12x16 pixels:
+        >>> method = BilateralSeparable(radius=8)
+        >>> image, state = method(frame, method.init(12, 16))
+        >>> image.shape, image.dtype
+        ((12, 16, 3), dtype('float32'))
     """
 
     def init_on(self, stencil: Stencil) -> SeparableState:

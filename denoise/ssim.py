@@ -1,4 +1,4 @@
-"""Structural similarity (Wang et al. 2004) of display values, for each colour.
+"""Structural similarity of display values, for each colour.
 
     SSIM = (2 m_a m_b + C1) (2 s_ab + C2) / ((m_a^2 + m_b^2 + C1) (s_a^2 + s_b^2 + C2))
 
@@ -6,8 +6,10 @@ m, s^2 and s_ab are means, variances and covariance under a Gaussian of sigma 1.
 11x11; C1 = 0.01^2, C2 = 0.03^2. The score is the mean over colours and over pixels whose window
 lies inside the image; a smaller image is mirrored at its border and counted whole.
 
-The same as scikit-image's `structural_similarity(gaussian_weights=True, sigma=1.5,
-use_sample_covariance=False, data_range=1, channel_axis=2)`, without its dependencies.
+Source: Wang et al. 2004, "Image quality assessment: from error visibility to structural
+similarity", doi:10.1109/TIP.2003.819861. The same as scikit-image's
+`structural_similarity(gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=1,
+channel_axis=2)`, without its dependencies.
 """
 
 from __future__ import annotations
@@ -22,7 +24,12 @@ _GAUSSIAN /= 2 * _GAUSSIAN.sum() - _GAUSSIAN[0]
 
 
 def ssim(a: np.ndarray, b: np.ndarray) -> float:
-    """Mean SSIM of two (h, w, 3) images of display values in [0, 1]; 1 for equal images."""
+    """Mean SSIM of two (h, w, 3) images of display values in [0, 1]; 1 for equal images.
+
+    Example:
+        >>> round(ssim(np.full((16, 16, 3), 0.5), np.full((16, 16, 3), 0.5)), 6)
+        1.0
+    """
     if min(a.shape[:2]) <= 2 * RADIUS:
         margins = ((RADIUS, RADIUS), (RADIUS, RADIUS), (0, 0))
         a, b = np.pad(a, margins, mode="symmetric"), np.pad(b, margins, mode="symmetric")

@@ -20,7 +20,8 @@ class Step:
     """Two frames in a row of one method.
 
     Attributes:
-        now, before: (image, reference), (h, w, 3) display values.
+        now: (image, reference) of this frame, (h, w, 3) display values in [0, 1].
+        before: the same of the frame before.
         source: (h, w) of `correspondence.previous_pixel`, None without guides.
         still: (h, w) mask of pixels where nothing has changed, None without guides.
     """
@@ -32,7 +33,14 @@ class Step:
 
 
 def flicker(step: Step) -> float | None:
-    """sqrt(mean((e_t(p) - e_{t-1}(p'))^2)) over pixels with a p'; None if there is none."""
+    """sqrt(mean((e_t(p) - e_{t-1}(p'))^2)) over pixels with a p'; None if there is none.
+
+    Example, with an error that changes by 0.1 from one frame to the next:
+        >>> black = np.zeros((2, 2, 3))
+        >>> there = np.arange(4).reshape(2, 2)
+        >>> round(flicker(Step((black + 0.1, black), (black, black), there, None)), 6)
+        0.1
+    """
     if step.source is None or not (there := step.source != NOWHERE).any():
         return None
     error, old = (np.subtract(*images, dtype=np.float64) for images in (step.now, step.before))
@@ -40,14 +48,26 @@ def flicker(step: Step) -> float | None:
 
 
 def difference_psnr(step: Step) -> float:
-    """-10 log10(mean(((a_t - a_{t-1}) - (b_t - b_{t-1}))^2)) in dB, pixel by pixel, no motion."""
+    """-10 log10(mean(((a_t - a_{t-1}) - (b_t - b_{t-1}))^2)) in dB, pixel by pixel, no motion.
+
+    Example:
+        >>> black = np.zeros((2, 2, 3))
+        >>> round(difference_psnr(Step((black + 0.1, black), (black, black), None, None)), 6)
+        20.0
+    """
     image, reference = (np.subtract(now, before, dtype=np.float64)
                         for now, before in zip(step.now, step.before))
     return decibels(mse(image, reference))
 
 
 def boiling(step: Step) -> float | None:
-    """sqrt(mean((a_t - a_{t-1})^2)) over still pixels; None if there is none."""
+    """sqrt(mean((a_t - a_{t-1})^2)) over still pixels; None if there is none.
+
+    Example:
+        >>> black, still = np.zeros((2, 2, 3)), np.array([[True, False], [False, True]])
+        >>> round(boiling(Step((black + 0.2, black), (black, black), None, still)), 6)
+        0.2
+    """
     if step.still is None or not step.still.any():
         return None
     change = np.subtract(step.now[0], step.before[0], dtype=np.float64)

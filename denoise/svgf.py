@@ -6,7 +6,8 @@ by it removes what noise is left (`wavelet.py`). The first level's output is the
 history.
 
 Source: Schied et al. 2017, "Spatiotemporal variance-guided filtering: real-time reconstruction for
-path-traced global illumination". Defaults are its constants; `longest` is 32 in NVIDIA's pass.
+path-traced global illumination", doi:10.1145/3105762.3105770. Defaults are its constants; `longest`
+is 32 in NVIDIA's pass.
 
 Departures, beside those that the three modules list:
 - A frame without direct and indirect light (an import) is one signal, its colour.
@@ -42,19 +43,33 @@ SIGNALS = ("direct", "indirect")
 class Svgf(OnLanes):
     """Accumulation over frames, then an a-trous filter guided by the variance (SVGF).
 
-    Attributes:
-        alpha, alpha_moments: least weight of the current frame in colour and in moments.
-        longest: history length that is not exceeded, frames.
-        levels: 1 to 8; the last one's taps lie 2^(levels - 1) pixels apart.
-        sigma_luminance: in deviations. sigma_depth: in slopes of the surface.
-        normal_power: exponent of the cosine between normals.
-        min_cosine, plane_tolerance: tests of history, see `reprojection.py`.
+    The switches (true or false) are the method's parts, each of which can be left out.
 
-        The rest are the method's parts, to be switched off one by one:
-        demodulate: filter light without texture. split: direct and indirect light apart.
-        accumulate: use history. fallback: 3x3 pixels where no bilinear tap passes.
-        temporal_variance: from history, not from a window in every frame.
-        feedback: the first level's output is the history, not what went into it.
+    Attributes:
+        alpha: least weight of the current frame in colour [1, 1e-6 to 1].
+        alpha_moments: least weight of the current frame in moments of luminance [1, 1e-6 to 1].
+        longest: cap of the history length [frames, 1 to 1e6].
+        levels: wavelet levels; taps of the last are 2^(levels - 1) pixels apart [1, 1 to 8].
+        sigma_luminance: falloff with difference of luminance [standard deviations, above 0].
+        sigma_depth: falloff with depth relative to its screen-space slope [1, above 0].
+        normal_power: exponent of the cosine between normals [1, above 0].
+        min_cosine: least cosine between a history tap's normal and the expected one, see
+            `reprojection.py` [1, -1 to 1].
+        plane_tolerance: largest distance of a history tap from the expected tangent plane
+            [share of depth, above 0].
+        demodulate: filter colour over albedo, where frames have albedo.
+        split: filter direct and indirect light separately.
+        accumulate: use history.
+        fallback: average 3x3 history pixels where no bilinear tap passes the tests.
+        temporal_variance: variance from history where there are four frames of it, not always
+            from a window.
+        feedback: the first level's output becomes the history, not its input.
+
+    Example, with `frame` a `Frame` of 12x16 pixels:
+        >>> method = Svgf(levels=4, feedback=False)
+        >>> image, state = method(frame, method.init(12, 16))
+        >>> image.shape, image.dtype
+        ((12, 16, 3), dtype('float32'))
     """
 
     alpha: float = 0.2

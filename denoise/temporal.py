@@ -1,13 +1,17 @@
 """Clamped temporal accumulation of the GAMES202 assignment.
 
-out = alpha C + (1 - alpha) clamp(H, mu - k sigma, mu + k sigma)
+    out = alpha C + (1 - alpha) clamp(H, mu - k sigma, mu + k sigma)
 
 C the current frame's (filtered) colour; H the history where the surface was (`reprojection.py`);
-mu and sigma mean and deviation of C in a window (`window_moments.py`), per channel; alpha = 1 where
-there is no history.
+mu and sigma mean and standard deviation of C in a window (`window_moments.py`), per channel;
+alpha = 1 where there is no history.
 
-The window mixes objects, as the assignment has it: with k = 1, a pixel at a corner of one colour
-among another has its history pulled towards the other. A wider box trades that for lag.
+Sources: GAMES202, assignment 5; Yang et al. 2020, "A survey of temporal antialiasing techniques",
+section 4.2 (history rectification), doi:10.1111/cgf.14018.
+
+Departures: reprojection is bilinear and tested by object, normal and plane (`nearest` gives the
+assignment's). As in the assignment, the window mixes objects: with k = 1, the history of a pixel at
+the corner of one colour in another is pulled towards the other. A wider box trades that for lag.
 """
 
 from __future__ import annotations
@@ -29,14 +33,23 @@ from .window_moments import RowMoments, window_moments
 
 @dataclass(frozen=True)
 class Temporal(OnLanes):
-    """Accumulation over frames of what is given, noisy or filtered.
+    """Accumulation over frames, noisy or filtered, with the history clamped to a window.
 
     Attributes:
-        alpha: weight of the current frame, above 0 to 1.
-        color_box: k, width of the clamp in deviations. clamp_radius: of its window, pixels
-            (another one compiles another kernel).
-        nearest: the assignment's reprojection, to the nearest pixel by object alone.
-        min_cosine, plane_tolerance: see `reprojection.py`; a nearest reprojection ignores them.
+        alpha: weight of the current frame [1, 1e-6 to 1].
+        color_box: k, half width of the clamp [standard deviations, 0 to 1e6].
+        clamp_radius: half width of the window [pixels, 1 to 16]; each value compiles a kernel.
+        nearest: the assignment's reprojection, to the nearest pixel, tested by object alone.
+        min_cosine: least cosine between a history tap's normal and the expected one, see
+            `reprojection.py`; not used with `nearest` [1, -1 to 1].
+        plane_tolerance: largest distance of a history tap from the expected tangent plane; not
+            used with `nearest` [share of depth, above 0].
+
+    Example, with `frame` a `Frame` of 12x16 pixels:
+        >>> method = Temporal(alpha=0.1)
+        >>> image, state = method(frame, method.init(12, 16))
+        >>> image.shape, image.dtype
+        ((12, 16, 3), dtype('float32'))
     """
 
     alpha: float = 0.2

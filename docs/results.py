@@ -1,0 +1,452 @@
+"""Prints the tables of README.md and docs/results.md, or writes them there (`--write`).
+
+    python docs/results.py                         # hours: the references
+    python docs/results.py --frames 0:2 --box-size 48x48 --room-size 48x27 --reference-spp 16 \\
+        --parts scores --data build/tiny           # a minute, to see that it works
+
+Each part is a block `<!-- results:NAME -->` ... `<!-- /results -->` in one of the two files. A part
+renders what it needs, denoises and scores it by the library, and says what its numbers stand on:
+frames, size, samples of the reference and its noise floor, seed, tone map, the input's own score.
+
+It can be stopped and started again: renders and references resume, results of the same parameters
+are kept. After a change of a method, `--again` denoises anew.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache, cached_property
+from itertools import pairwise
+from pathlib import Path
+
+import click
+import numpy as np
+
+import onespp  # noqa: F401 - finds LLVM before anything imports Dr.Jit
+from denoise import hard as hard_study
+from denoise.ablation import ablate, variants
+from denoise.ablation import markdown as ablation_table
+from denoise.interleave import read_times, time_methods
+from denoise.lead import markdown as lead_table
+from denoise.methods import METHODS, Method, build, parameters
+from denoise.peers import PEERS
+from denoise.plot import plot_speed_against_error
+from denoise.score import score
+from denoise.scorecard import INPUT, MethodScore, Scores
+from denoise.stream import denoise_sequence
+from denoise.tonemap import TONE_MAP
+from render.arguments import parse_size
+from render.channels import REPLAY
+from render.command import use
+from render.errors import InputError
+from render.job import RenderJob, render_sequence
+from render.lock import writing
+from render.manifest import format_frames, parse_frames
+from render.sequence import Sequence as FrameSequence
+from render.terminal import run as run_command
+from scenes import catalog
+from scenes.hard import HARD
+
+ROOT = Path(__file__).resolve().parents[1]
+PLAIN, OURS = ("mis", "pcg"), ("resampled", "zsobol")  # --direct and --sampler
+SUMMARY = (INPUT, "atrous", "svgf", "oidn-high", "onespp")
+BEST, PEER, RATIO_TO = "onespp", "oidn-high", "oidn-fast"
+OTHERS = {  # label -> scene, frames, size, seed: scenes and frames that nothing was tuned on
+    "`docs/slow_box.py`: a quarter of the pace": ("docs/slow_box.py", "0:16", "128x128", 5),
+    "`box`, frames 60:92:2: twice the pace": ("box", "60:92:2", "128x128", 5),
+    "`room`, frames 40:72:4: four times the pace, moving camera": (
+        "room", "40:72:4", "160x90", 5),
+    "`docs/swinging_lamp.py`: a light that moves and changes colour, an orbiting camera": (
+        "docs/swinging_lamp.py", "0:16", "128x128", 5),
+}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to render, and where it lies.
+
+    Attributes:
+        frames: as `--frames` of `onespp render`. sizes: scene -> WxH. spp: of the references of
+            the two scenes; others_spp, hard_spp: of the other scenes' and the hard ones'.
+        seed: of the two scenes. hard: names of hard scenes. data: folder of the sequences.
+        again: denoise anew what has results already.
+    """
+
+    frames: str
+    sizes: Mapping[str, str]
+    spp: int
+    others_spp: int
+    hard_spp: int
+    seed: int
+    hard: tuple[str, ...]
+    data: Path
+    again: bool
+
+    @cached_property
+    def pairs(self) -> dict[str, tuple[Scores, Scores]]:
+        """Scene -> scores on the plain input, and on ours."""
+        return {scene: (self.scored(scene, plain=True), self.scored(scene))
+                for scene in self.sizes}
+
+    def scored(self, scene: str, plain: bool = False) -> Scores:
+        """Scores of all methods on one of the two scenes; on ours, with times in turns."""
+        sequence = self.sequence(scene, plain)
+        methods = all_methods(sequence)
+        denoise(sequence, methods, self.again)
+        if not plain and (self.again or not timed(sequence, methods)):
+            say(f"{scene}: times in turns")
+            first = {name: methods[name] for name in (RATIO_TO,) if name in methods}
+            with writing(sequence.folder, "time"):
+                time_methods(sequence, {**first, **methods})
+        return scores_of(sequence)
+
+    def sequence(self, scene: str, plain: bool = False) -> FrameSequence:
+        """Frames and references of one of the two scenes; both inputs share the references."""
+        def rendered(name: str, estimator: tuple[str, str],
+                     like: FrameSequence | None = None) -> FrameSequence:
+            return render(self.data / name, scene, self.frames, self.sizes[scene], self.spp,
+                          self.seed, estimator, like)
+
+        ours = rendered(scene, OURS)
+        return rendered(f"{scene}_plain", PLAIN, ours) if plain else ours
+
+    @cached_property
+    def others(self) -> dict[str, Scores]:
+        """Label -> scores on our input of scenes and frames that nothing was tuned on."""
+        found = {}
+        for label, (scene, frames, size, seed) in OTHERS.items():
+            name = f"other_{Path(scene).stem}"
+            sequence = render(self.data / name, str(ROOT / scene) if scene.endswith(".py")
+                              else scene, frames, size, self.others_spp, seed)
+            known = all_methods(sequence)
+            denoise(sequence, {m: known[m] for m in (BEST, PEER, "atrous") if m in known},
+                    self.again)
+            found[label] = scores_of(sequence)
+        return found
+
+    @cached_property
+    def hard_rows(self) -> list[hard_study.Row]:
+        """Every method on the hard scenes."""
+        rows = []
+        needed = sorted({c for method in METHODS.values() for c in method.needs})
+        for name in self.hard:
+            known, scene = HARD[name], HARD[name].make()
+            sequence = render(self.data / "hard" / name, f"hard/{name}", f"0:{scene.frames}",
+                              f"{scene.width}x{scene.height}", self.hard_spp, 0, added=needed)
+            say(f"hard/{name}: judge")
+            rows += hard_study.judge(sequence, name, known.event, known.diffuse)
+        return rows
+
+
+def say(text: str) -> None:
+    click.echo(text, err=True)
+
+
+def render(folder: Path, scene_name: str, frames: str, size: str, spp: int, seed: int,
+           estimator: tuple[str, str] = OURS, like: FrameSequence | None = None,
+           added: Iterable[str] = REPLAY) -> FrameSequence:
+    """Render what is missing; references are copied from `like`, which has the same ones."""
+    scene = catalog.load(scene_name)
+    height, width = parse_size(size)
+    direct, sampler = estimator
+    command = command_of(scene_name, frames, size, spp, seed, direct, sampler)
+    job = RenderJob(scene, parse_frames(frames), height, width, seed=seed, reference_spp=spp,
+                    added=tuple(added), direct=direct, sampler=sampler, command=command)
+    say(f"{folder.name}: render {frames} at {size}, reference {spp} spp")
+    with writing(folder, "render"):
+        if like is not None:
+            sequence = FrameSequence.create(folder, job.manifest())
+            for i in sequence.frames:
+                if like.has_reference(i) and not sequence.has_reference(i):
+                    sequence.write_reference(i, like.read_reference(i))
+        return render_sequence(job, folder)
+
+
+def command_of(scene: str, frames: str, size: str, spp: int, seed: int, direct: str,
+               sampler: str) -> str:
+    """The command line that renders the same."""
+    scene = os.path.relpath(scene, ROOT) if scene.endswith(".py") else scene
+    return (f"onespp render {scene} --frames {frames} --size {size} --reference-spp {spp} "
+            f"--seed {seed} --channels +gradient --direct {direct} --sampler {sampler}")
+
+
+def all_methods(sequence: FrameSequence) -> dict[str, Method]:
+    """Every method, and every peer that can run here, that the sequence has the channels of."""
+    names = [*METHODS, *(name for name, peer in PEERS.items() if peer.available())]
+    return {name: method for name in names
+            if set((method := build(name)).needs) <= set(sequence.manifest.channels)}
+
+
+def denoise(sequence: FrameSequence, methods: Mapping[str, Method], again: bool) -> None:
+    """Denoise by each method that has no complete results of the same parameters."""
+    for name, method in methods.items():
+        if again or not is_denoised(sequence, name, method):
+            say(f"{sequence.folder.name}: denoise {name}")
+            with writing(sequence.folder, f"denoise-{name}"):
+                denoise_sequence(sequence, method, name,
+                                 command=f"onespp denoise {sequence.folder.name} --method {name}")
+
+
+def is_denoised(sequence: FrameSequence, name: str, method: Method) -> bool:
+    return (name in sequence.methods() and all(sequence.has_result(name, i)
+                                               for i in sequence.frames)
+            and sequence.read_run(name).parameters == parameters(method))
+
+
+def timed(sequence: FrameSequence, methods: Mapping[str, Method]) -> bool:
+    """Whether times.json has them all, with the same parameters."""
+    times = read_times(sequence.folder)
+    return times is not None and all(
+        name in times.methods and times.methods[name].parameters == parameters(method)
+        for name, method in methods.items())
+
+
+@cache
+def scores_in(folder: Path) -> Scores:
+    say(f"{folder.name}: score")
+    with writing(folder, "score"):
+        return score(FrameSequence.open(folder), pictures=False)
+
+
+def scores_of(sequence: FrameSequence) -> Scores:
+    return scores_in(sequence.folder)
+
+
+# The tables: each part makes the text of its block.
+
+def number(score: MethodScore | None, measure: str, form: str) -> str:
+    value = score[measure] if score else None
+    return "" if value is None else format(value, form)
+
+
+def milliseconds(score: MethodScore | None) -> str:
+    ms = score.ms_per_frame if score else None
+    return "" if ms is None else f"{ms:.1f}" if ms < 10 else f"{ms:.0f}"
+
+
+def table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    heads = list(heads)
+    return "\n".join("| " + " | ".join(cells) + " |"
+                     for cells in (heads, ["---"] * len(heads), *rows))
+
+
+def named(name: str) -> str:
+    return "input, 1 spp" if name == INPUT else f"**`{name}`**" if name == BEST else f"`{name}`"
+
+
+def frames_text(frames: list[int]) -> str:
+    """Frames as one would type them: 0:30, or 60:92:2 for every second."""
+    steps = {b - a for a, b in pairwise(frames)}
+    if len(steps) == 1 and (step := steps.pop()) > 1:
+        return f"{frames[0]}:{frames[-1] + step}:{step}"
+    return format_frames(frames)
+
+
+def conditions(scores: Scores) -> str:
+    """What numbers of a sequence stand on, with the score of its own input."""
+    floor = scores.reference_floor_db
+    noisy = scores.methods[INPUT]["psnr_srgb"]
+    return (f"`{scores.scene}`: frames {frames_text(scores.frames)} at {scores.size[0]}x"
+            f"{scores.size[1]}, reference {scores.reference_spp} spp (noise floor "
+            + (f"{floor:.1f} dB" if floor is not None else "not known")
+            + f"), seed {scores.seed}, input "
+            + (f"{noisy:.2f} dB" if noisy is not None else "without a score"))
+
+
+def machine_of(plan: Plan) -> str:
+    times = read_times(plan.data / next(iter(plan.sizes)))
+    if times is None:
+        return "times of single runs"
+    return f"times in turns on {times.machine}, {times.threads} threads"
+
+
+def names_in(scores: Iterable[Scores]) -> list[str]:
+    """Methods of several scores: the input, ours as in `METHODS` (the best one last), peers."""
+    there = {name for s in scores for name in s.methods}
+    order = [INPUT, *(m for m in METHODS if m != BEST), *PEERS, BEST]
+    return [name for name in order if name in there]
+
+
+def summary(plan: Plan) -> str:
+    ours = {scene: pair[1] for scene, pair in plan.pairs.items()}
+    heads = ["method", *(f"{scene} {what}" for scene in ours
+                         for what in ("PSNR", "FLIP", "flicker", "ms"))]
+    rows = [[named(name), *(cell for scores in ours.values() for cell in _four(scores, name))]
+            for name in SUMMARY if any(name in scores.methods for scores in ours.values())]
+    return (f"{table(heads, rows)}\n\nPSNR in dB on {TONE_MAP}, mean over frames. "
+            f"{'; '.join(map(conditions, ours.values()))}; {machine_of(plan)}.")
+
+
+def _four(scores: Scores, name: str) -> list[str]:
+    found = scores.methods.get(name)
+    return [number(found, "psnr_srgb", ".2f"), number(found, "flip", ".3f"),
+            number(found, "flicker", ".3f"), milliseconds(found)]
+
+
+def all_scores(plan: Plan) -> str:
+    heads = ["method", *(head for scene in plan.pairs for head in (
+        f"{scene}, plain input", scene, "FLIP", "flicker", "ms", "ratio"))]
+    ratios = {scene: read_times(plan.data / scene) for scene in plan.pairs}
+    rows = []
+    for name in names_in(s for pair in plan.pairs.values() for s in pair):
+        row = [named(name)]
+        for scene, (plain, ours) in plan.pairs.items():
+            times = ratios[scene]
+            measured = times.methods.get(name) if times else None
+            row += [number(plain.methods.get(name), "psnr_srgb", ".2f"), *_four(ours, name),
+                    f"{measured.ratio:.2f}" if measured else ""]
+        rows.append(row)
+    first = next(iter(ratios.values()))
+    lines = [f"{conditions(ours)} (plain {number(plain.methods[INPUT], 'psnr_srgb', '.2f')} dB)"
+             for plain, ours in plan.pairs.values()]
+    return (f"{table(heads, rows)}\n\nPSNR in dB on {TONE_MAP}, mean over frames; FLIP, flicker "
+            f"and time on our input. {'; '.join(lines)}; {machine_of(plan)}"
+            + (f"; ratio: median ratio to `{first.ratio_to}`, step by step." if first else "."))
+
+
+def lead(plan: Plan) -> str:
+    if not all(PEER in s.methods for pair in plan.pairs.values() for s in pair):
+        return f"`{PEER}` cannot run on this machine (`pip install pyoidn`)."
+    return (f"{lead_table(BEST, PEER, plan.pairs)}\n\n"
+            + "; ".join(conditions(pair[1]) for pair in plan.pairs.values())
+            + f"; PSNR on {TONE_MAP}.")
+
+
+def others(plan: Plan) -> str:
+    methods = [name for name in (INPUT, BEST, PEER, "atrous")
+               if any(name in scores.methods for scores in plan.others.values())]
+    rows = [[label, *(_three(scores.methods.get(name)) for name in methods)]
+            for label, scores in plan.others.items()]
+    heads = ["on our input: PSNR dB (FLIP, flicker)", *map(named, methods)]
+    return (f"{table(heads, rows)}\n\n" + "; ".join(map(conditions, plan.others.values()))
+            + f"; PSNR on {TONE_MAP}.")
+
+
+def _three(score: MethodScore | None) -> str:
+    psnr, flip, flicker = (number(score, m, f) for m, f in (
+        ("psnr_srgb", ".2f"), ("flip", ".3f"), ("flicker", ".3f")))
+    return f"{psnr} ({flip}, {flicker})" if psnr else ""
+
+
+def ablation(plan: Plan) -> str:
+    results = {}
+    for scene in plan.sizes:
+        say(f"{scene}: ablation of svgf")
+        results[scene] = ablate(plan.sequence(scene), variants("svgf"))
+    return (f"{ablation_table('svgf', results)}\n\n"
+            + "; ".join(conditions(scores_of(plan.sequence(s))) for s in plan.sizes)
+            + f"; PSNR on {TONE_MAP}.")
+
+
+def hard_of_best(plan: Plan) -> str:
+    rows = plan.hard_rows
+    noisy = {row.scene: np.mean(row.psnr) for row in rows if row.method == INPUT}
+    heads = ["scene", "input, dB", f"`{BEST}`, dB",
+             "gain over history-free, dB: mean (worst frame)", "frames to recover", "energy"]
+    cells = [[f"`{r.scene}`", f"{noisy[r.scene]:.2f}", f"{np.mean(r.psnr):.2f}",
+              f"{r.gain:+.1f} ({r.worst:+.1f})",
+              "" if r.recovery is None else f"{'' if r.recovered else '> '}{r.recovery}",
+              f"{r.energy:.3f}"] for r in rows if r.method == BEST]
+    return f"{table(heads, cells)}\n\n{_hard_conditions(plan)}"
+
+
+def hard(plan: Plan) -> str:
+    return f"{hard_study.markdown(plan.hard_rows)}\n\n{_hard_conditions(plan)}"
+
+
+def _hard_conditions(plan: Plan) -> str:
+    floors = [row.floor for row in plan.hard_rows]
+    scene = HARD[plan.hard[0]].make()
+    return (f"{len(plan.hard)} scenes, {scene.frames} frames of {scene.width}x{scene.height}, "
+            f"references {plan.hard_spp} spp (noise floors {min(floors):.1f} to "
+            f"{max(floors):.1f} dB), seed 0, PSNR on {TONE_MAP}.")
+
+
+PARTS: dict[str, tuple[Path, Callable[[Plan], str]]] = {
+    "summary": (ROOT / "README.md", summary),
+    "scores": (ROOT / "docs/results.md", all_scores),
+    "lead": (ROOT / "docs/results.md", lead),
+    "others": (ROOT / "docs/results.md", others),
+    "ablation": (ROOT / "docs/results.md", ablation),
+    "hard-onespp": (ROOT / "docs/results.md", hard_of_best),
+    "hard": (ROOT / "docs/results.md", hard),
+}
+
+
+def block(name: str, text: str, command: str) -> str:
+    return (f"<!-- results:{name} -->\n{text}\n\nPrinted by `{command}`.\n<!-- /results -->")
+
+
+def replaced(page: str, name: str, new: str) -> str:
+    """The page with the block of that name replaced; InputError if it has no such block."""
+    pattern = re.compile(rf"<!-- results:{re.escape(name)} -->.*?<!-- /results -->", re.S)
+    if len(pattern.findall(page)) != 1:
+        raise InputError(f"there is no one block `<!-- results:{name} -->` to write to")
+    return pattern.sub(lambda _: new, page)
+
+
+def own_command(name: str, plan: Plan) -> str:
+    """The command line that prints a part."""
+    if name == "others":
+        given = f"--others-spp {plan.others_spp}"
+    elif name.startswith("hard"):
+        given = f"--hard-spp {plan.hard_spp}" + "".join(
+            f" --hard {scene}" for scene in plan.hard if plan.hard != tuple(HARD))
+    else:
+        sizes = " ".join(f"--{scene}-size {size}" for scene, size in plan.sizes.items())
+        given = (f"--frames {plan.frames} {sizes} --reference-spp {plan.spp} "
+                 f"--seed {plan.seed}")
+    return f"python docs/results.py --parts {name} {given}"
+
+
+@click.command()
+@click.option("--parts", default=",".join(PARTS), metavar="NAMES",
+              help=f"Which tables, of {', '.join(PARTS)}; default all.")
+@click.option("--frames", default="0:30", show_default=True, metavar="RANGE",
+              help="Frames of box and room.")
+@click.option("--box-size", default="256x256", show_default=True, metavar="WxH")
+@click.option("--room-size", default="320x180", show_default=True, metavar="WxH")
+@click.option("--reference-spp", default=1024, show_default=True, metavar="N",
+              help="Of box and room.")
+@click.option("--others-spp", default=256, show_default=True, metavar="N",
+              help="Of the scenes that nothing was tuned on.")
+@click.option("--hard-spp", default=256, show_default=True, metavar="N",
+              help="Of the hard scenes.")
+@click.option("--seed", default=0, show_default=True, metavar="N", help="Of box and room.")
+@click.option("--hard", "hard_names", multiple=True, metavar="NAME", type=click.Choice([*HARD]),
+              help="A hard scene; may be given several times; default all.")
+@click.option("--data", type=click.Path(path_type=Path), default=ROOT / "data/results",
+              metavar="DIR", help="Folder of the sequences; default data/results.")
+@click.option("--again", is_flag=True, help="Denoise and time anew; renders are kept.")
+@click.option("--write", is_flag=True,
+              help="Write the tables to README.md and docs/results.md, and the plot.")
+@click.option("--threads", type=int, metavar="N", help="CPU threads; default all.")
+def results(parts: str, frames: str, box_size: str, room_size: str, reference_spp: int,
+            others_spp: int, hard_spp: int, seed: int, hard_names: tuple[str, ...], data: Path,
+            again: bool, write: bool, threads: int | None) -> None:
+    """Print the tables of README.md and docs/results.md as Markdown."""
+    names = [name.strip() for name in parts.split(",") if name.strip()]
+    unknown = [name for name in names if name not in PARTS]
+    if unknown or not names:
+        raise InputError(f"--parts names {unknown[0] if unknown else 'nothing'}: use some of "
+                         f"{', '.join(PARTS)}")
+    use("auto", threads)
+    plan = Plan(frames, {"box": box_size, "room": room_size}, reference_spp, others_spp, hard_spp,
+                seed, hard_names or tuple(HARD), data, again)
+    for name in names:
+        path, make = PARTS[name]
+        text = block(name, make(plan), own_command(name, plan))
+        if write:
+            path.write_text(replaced(path.read_text("utf-8"), name, text), "utf-8")
+            say(f"wrote {name} into {path.relative_to(ROOT)}")
+        else:
+            click.echo(f"{text}\n")
+    if write and "scores" in names:
+        plot_speed_against_error(plan.pairs["box"][1], ROOT / "docs/speed_box.png")
+
+
+if __name__ == "__main__":
+    run_command(results, name="python docs/results.py")

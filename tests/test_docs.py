@@ -1,0 +1,450 @@
+"""The documentation: it builds without a warning, code in it runs, commands parse, links hold."""
+
+from __future__ import annotations
+
+import doctest
+import re
+import shlex
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+from types import ModuleType
+
+import click
+import draw_architecture
+import from_code
+import pytest
+import results
+from report_sequence import make_report_sequence
+from sphinx.cmd.build import build_main
+from synthetic import make_frame, noisy
+
+import denoise.ablation
+import denoise.lead
+import onespp
+import render.bench
+from denoise.methods import METHODS, build, parameters
+from denoise.outliers import RemoveOutliers
+from denoise.parameters import pairs
+from denoise.peers import PEERS
+from denoise.score import score
+from denoise.stability import MEASURES
+from denoise.tonemap import srgb_from_linear
+from render.errors import InputError
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+PAGES = {path.name: path for path in (ROOT / "README.md", *sorted(DOCS.glob("*.md")))}
+pytestmark = pytest.mark.filterwarnings("ignore:.*MystReferenceResolver:DeprecationWarning")
+
+BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.M | re.S)
+CODE = re.compile(r"`([^`\n]+)`")
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+FOREIGN = {"ruff", "pyright", "pip", "python3"}  # programs whose options are not ours
+
+UNKNOWN = {"my_scene.py", "tests/test_architecture.py"}  # the reader's, and one to come
+
+# The pages are written for the package `onespp`; until its folders are inside, what they are today.
+INSTALLED = hasattr(onespp, "__path__")
+TODAY = {
+    "onespp.denoise.run.sequence": "denoise.stream", "onespp.denoise.score.sequence":
+    "denoise.score", "onespp.denoise.metrics.table": "denoise.metrics",
+    "onespp.render.files.sequence import FrameSequence":
+    "render.sequence import Sequence as FrameSequence", "onespp.scenes": "scenes"}
+APART = {"lead": denoise.lead.lead, "ablate": denoise.ablation.ablation,
+         "bench render": render.bench.bench}
+
+
+def blocks(page: str, language: str) -> list[tuple[str, str]]:
+    """(what stands behind the language, text) of the code blocks of a page."""
+    return [(m[2].strip(), m[3]) for m in BLOCK.finditer(PAGES[page].read_text("utf-8"))
+            if m[1] == language]
+
+
+def as_installed(code: str) -> str:
+    for name, today in {} if INSTALLED else TODAY.items():
+        code = code.replace(name, today)
+    return code
+
+
+def having(language: str, word: str | None = None) -> list[str]:
+    """Pages that have code blocks of a language (without the word behind it)."""
+    return [page for page in PAGES if any(word not in info.split() for info, _ in
+                                          blocks(page, language))]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("site")
+    assert build_main(["-E", "-W", "--keep-going", "-q", "-b", "html", str(DOCS), str(out)]) == 0
+    return out
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch) -> Path:
+    """A working folder that has a small sequence in data/demo."""
+    make_report_sequence(tmp_path / "data/demo", 2)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+class Anchors(HTMLParser):
+    """The ids of an HTML page, and where it points to."""
+
+    def __init__(self, page: Path) -> None:
+        super().__init__()
+        self.ids: set[str] = set()
+        self.targets: list[str] = []
+        self.feed(page.read_text("utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = dict(attrs)
+        self.ids.add(found.get("id") or "")
+        if target := found.get("href" if tag in ("a", "link") else "src"):
+            self.targets.append(target)
+
+
+def test_pages_build_without_warnings_and_every_link_in_them_leads_somewhere(site):
+    pages = {path.name: Anchors(path) for path in site.glob("*.html")}
+    assert {"index.html", *(f"{Path(page).stem}.html" for page in PAGES if page != "README.md")
+            } <= pages.keys()
+    for name, page in pages.items():
+        for target in page.targets:
+            if re.match(r"(https?|data|mailto):", target):
+                continue
+            path, _, anchor = target.partition("#")
+            path = path.partition("?")[0]
+            assert not path or (site / path).exists(), f"{name} -> {target}"
+            where = pages.get(path or name)
+            assert not anchor or where is None or anchor in where.ids, f"{name} -> {target}"
+
+
+def test_what_is_made_from_the_code_is_in_the_pages(site):
+    text = {name: (site / f"{name}.html").read_text("utf-8")
+            for name in ("architecture", "methods", "files", "metrics", "scenes", "commands")}
+    assert not any("from-code:" in page for page in text.values())
+    assert all(f'id="method-{name}"' in text["methods"] for name in METHODS)
+    assert "10.1145/3105762.3105770" in text["methods"]
+    assert text["architecture"].count('<g class="room') == len(from_code.rooms())
+    assert "replay_before" in text["files"]
+    assert "hard/switched-off" in text["scenes"]
+    assert "--reference-spp" in text["commands"]
+
+
+@pytest.fixture
+def house(tmp_path) -> Path:
+    """A source tree: `render/job` above the tracer, `render/frame` below it."""
+    for name, text in {
+            "render/__init__": '"""Frames."""', "render/frame": "x = 1",
+            "render/job": "from render.tracer.path import y\nfrom .frame import x",
+            "render/tracer/__init__": '"""Light, traced."""',
+            "render/tracer/path": "from ..frame import x\ndef f(): import scenes.box",
+            "scenes/box": "import os", "denoise/catalog": "from onespp.render import frame",
+            "denoise/cli/main": "from .. import catalog\nimport onespp.render.frame"}.items():
+        path = tmp_path / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text + "\n")
+    return tmp_path
+
+
+def test_rooms_are_folders_and_imports_between_them(house):
+    found = draw_architecture.rooms(house)
+    assert {key: (room.files, room.below) for key, room in found.items()} == {
+        "render^": (["job"], {"render/tracer", "render"}), "render": (["frame"], set()),
+        "render/tracer": (["path"], {"render", "scenes"}), "scenes": (["box"], set()),
+        "denoise": (["catalog"], {"render"}), "denoise/cli": (["main"], {"denoise", "render"})}
+    assert found["render/tracer"].about == "Light, traced."
+    assert draw_architecture.reduced(found) == [
+        ("denoise", "render"), ("denoise/cli", "denoise"), ("render/tracer", "render"),
+        ("render/tracer", "scenes"), ("render^", "render/tracer")]
+    assert draw_architecture.circles(found) == []
+
+
+def test_a_circle_is_found_and_drawn_as_wrong(house):
+    (house / "scenes/box.py").write_text("import render.job\n")
+    found = draw_architecture.rooms(house)
+    assert ("render^", "scenes") in draw_architecture.circles(found)
+    assert draw_architecture.svg(found).count(" wrong") == 3
+    assert " wrong" not in draw_architecture.svg(draw_architecture.rooms(ROOT))
+
+
+def test_arrows_go_down_and_rooms_do_not_overlap(house):
+    for found in (draw_architecture.rooms(house), draw_architecture.rooms(ROOT)):
+        level = draw_architecture.layers(found)
+        assert all(level[key] > level[below] for key, room in found.items() for below in room.below)
+        rows, x, _ = draw_architecture.arrange(found)
+        for row in rows:
+            for a, b in pairwise([x[p] for p in row if isinstance(p, str)]):
+                assert b - a >= draw_architecture.ROOM_WIDTH
+
+
+def slugs(page: Path) -> set[str]:
+    heads = re.findall(r"^#+ (.*)$", page.read_text("utf-8"), re.M)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).strip().replace(" ", "-") for head in heads}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_of_the_sources_lead_to_files_and_headings(page):
+    path = PAGES[page]
+    for target in LINK.findall(path.read_text("utf-8")):
+        if not target.startswith("http"):
+            file, _, anchor = target.partition("#")
+            other = path if not file else path.parent / file
+            assert other.is_file(), f"{page} -> {target}"
+            assert not anchor or anchor in slugs(other), f"{page} -> {target}"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_files_that_are_named_exist(page):
+    """`tests/test_x.py`, or the end of a path, as `tracer/path.py`."""
+    files = {path.relative_to(ROOT).as_posix() for path in ROOT.glob("*/**/*.py")
+             if not path.relative_to(ROOT).parts[0].startswith(".")}
+    for code in CODE.findall(PAGES[page].read_text("utf-8")):
+        for name in re.findall(r"[\w./]+\.py\b", code):
+            if name not in UNKNOWN and (INSTALLED or name.startswith(("tests/", "docs/"))):
+                assert any(f"/{file}".endswith(f"/{name}") for file in files), f"{page}: {name}"
+
+
+def test_the_readme_is_one_page():
+    assert len((ROOT / "README.md").read_bytes()) <= 6000
+
+
+@pytest.mark.parametrize("page", having("python"))
+def test_python_blocks_run(page, folder, call):
+    names: dict = {"__name__": "page"}
+    module = ModuleType("page")  # a dataclass looks its module up
+    sys.modules["page"] = module
+    try:
+        for number, (_, code) in enumerate(blocks(page, "python"), 1):
+            exec(compile(as_installed(code), f"{page}, Python block {number}", "exec"), names)
+            if "def scene(" in code:
+                Path("my_scene.py").write_text(as_installed(code))
+                code, out, err = call("render", "my_scene.py", "--frames", "0:1", "--size", "16x9",
+                                      "--out", "data/mine")
+                assert (code, out) == (0, "rendered 1 frames into data/mine\n"), err
+    finally:
+        del sys.modules["page"]
+
+
+@pytest.mark.parametrize("page", having("sh", "costly"))
+def test_cheap_commands_run(page, folder, call):
+    for info, text in blocks(page, "sh"):
+        if "costly" not in info.split():
+            for words in command_lines(text):
+                assert words[0] == "onespp", f"{page}: mark the block as costly"
+                code, _, err = call(*words[1:])
+                assert code == 0, f"{page}: {' '.join(words)}: {err}"
+
+
+def command_lines(text: str) -> list[list[str]]:
+    """The words of each command of a shell block."""
+    found: list[list[str]] = []
+    for line in text.replace("\\\n", " ").splitlines():
+        words = shlex.split(line, comments=True)
+        while words:
+            end = words.index("&&") if "&&" in words else len(words)
+            found.append(words[:end])
+            words = words[end + 1:]
+    return found
+
+
+@pytest.mark.parametrize("page", having("sh"))
+def test_every_command_line_parses(page):
+    for _, text in blocks(page, "sh"):
+        for words in command_lines(text):
+            check_command(words)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_commands_in_the_text_are_there(page):
+    """`onespp score --by-cause` may lack its arguments, but names a command and its options."""
+    text = BLOCK.sub("", PAGES[page].read_text("utf-8"))
+    options = {o for command in (*map(at, known_commands()), results.results)
+               for p in command.params for o in (*p.opts, *p.secondary_opts)} | {"--help"}
+    for code in CODE.findall(text):
+        words = shlex.split(code) if "'" not in code and '"' not in code else code.split()
+        if words[0] == "onespp" and len(words) > 1:
+            command, rest = find(words[1:])
+            own = {o for p in command.params for o in (*p.opts, *p.secondary_opts)}
+            assert {w for w in rest if w.startswith("--")} <= own, f"{page}: {code}"
+        elif words[0].startswith("--"):
+            assert {w for w in words if w.startswith("--")} <= options, f"{page}: {code}"
+        elif words[0] in ("make", "python", "pytest"):
+            check_command(words)
+        check_settings(words)
+
+
+def known_commands() -> list[str]:
+    return [*(path for path, _ in from_code.walk(onespp.app)), *APART]
+
+
+def at(path: str) -> click.Command:
+    return find(path.split())[0]
+
+
+def find(words: list[str]) -> tuple[click.Command, list[str]]:
+    """The command that words begin with, and the words behind it."""
+    for length in (2, 1):
+        path = " ".join(words[:length])
+        found = dict(from_code.walk(onespp.app)).get(path) or APART.get(path)
+        if found is not None:
+            return found, words[length:]
+    raise AssertionError(f"there is no command 'onespp {' '.join(words)}'")
+
+
+def check_command(words: list[str]) -> None:
+    """Fails unless a command line would be understood."""
+    program, *rest = words
+    program = program.rpartition("/")[2]
+    if program == "python" and rest[:1] == ["-m"]:
+        program, *rest = rest[1:]
+    if program == "onespp" and rest:
+        command, rest = find(rest)
+        parse(command, rest)
+        check_settings(rest)
+    elif program == "make":
+        targets = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.M)
+        assert {w for w in rest if "=" not in w} <= set(targets), words
+    elif program == "python" and rest[0] == "docs/results.py":
+        parse(results.results, rest[1:])
+    elif program in ("python", "pytest"):
+        assert all((ROOT / w).is_file() for w in rest if w.endswith(".py")), words
+    else:
+        assert program in {"onespp", *FOREIGN}, words
+
+
+def parse(command: click.Command, words: list[str]) -> None:
+    try:
+        command.make_context("onespp", list(words))
+    except click.exceptions.Exit:
+        pass
+    except click.UsageError as error:
+        raise AssertionError(f"{words}: {error.format_message()}") from None
+
+
+def check_settings(words: list[str]) -> None:
+    """Parameters of `--set` are a method's: the one that is named, or any."""
+    settings = pairs(b for a, b in pairwise(words) if a == "--set")
+    named = [b for a, b in pairwise(words) if a == "--method"]
+    for key, value in settings.items():
+        able = [name for name in named or METHODS if key in parameters(build(name))]
+        assert able, f"no method has the parameter {key}"
+        build(able[0], {key: value})
+
+
+def test_a_misspelt_command_line_is_noticed():
+    lines = ("onespp scor data/room", "onespp score --pictuers data/room", "make dmeo",
+             "onespp denoise data/room --set levls=3", "python docs/results.py --spp 3")
+    for line in lines:
+        with pytest.raises(AssertionError):
+            check_command([str(word) for word in line.split()])
+
+
+@pytest.mark.parametrize("name", [*(m for m in METHODS if m != "onespp"), "outliers", pytest.param(
+    "onespp", marks=pytest.mark.xfail(strict=True, reason="`fade` has no line of its own yet"))])
+def test_every_parameter_is_documented_and_its_range_holds(name):
+    method = RemoveOutliers() if name == "outliers" else build(name)
+    for p in from_code.parameters(method):
+        assert p.about, f"{name}.{p.name} is not among the Attributes"
+        inside, outside = bounds(p.range)
+        kind = type(p.default)
+        for value in inside:
+            changed(name, p.name, kind(value))
+        for value in outside:
+            with pytest.raises(InputError, match=p.name):
+                changed(name, p.name, kind(value))
+
+
+def changed(name: str, parameter: str, value: float) -> None:
+    """InputError if the method, or the stage before it, refuses the value."""
+    if name == "outliers":
+        replace(RemoveOutliers(), **{parameter: value})
+    else:
+        build(name, {parameter: str(value)})
+
+
+def bounds(range_: str) -> tuple[list[float], list[float]]:
+    """Values on the edge of a range, and values just outside of it."""
+    if between := re.fullmatch(r"(\S+) to (\S+)", range_):
+        low, high = map(float, between.groups())
+        off = 1.0 if low == int(low) and high == int(high) else 0.5 * low
+        return [low, high], [low - off, high + off]
+    if above := re.fullmatch(r"above (\S+)", range_):
+        least = float(above[1])
+        return [least + 1e-3], [least]
+    return [], []
+
+
+def modules() -> list[ModuleType]:
+    """Those whose public examples run: of the methods and of the metrics."""
+    things = [*METHODS.values(), RemoveOutliers, *(m.function for m in MEASURES.values()),
+              srgb_from_linear]
+    return [sys.modules[name] for name in dict.fromkeys(t.__module__ for t in things)]
+
+
+def test_examples_of_docstrings_run():
+    frame = noisy(make_frame(12, 16))
+    runner, finder = doctest.DocTestRunner(), doctest.DocTestFinder()
+    examples = {test.name: test for module in modules()
+                for test in finder.find(module, extraglobs={"frame": frame}) if test.examples}
+    for test in examples.values():
+        runner.run(test)
+    assert runner.summarize().failed == 0
+    assert len(examples) >= 15
+
+
+def test_every_block_of_results_has_a_part_and_every_part_a_block():
+    for path in (ROOT / "README.md", DOCS / "results.md"):
+        found = re.findall(r"<!-- results:([\w-]+) -->", path.read_text("utf-8"))
+        assert found == [name for name, (where, _) in results.PARTS.items() if where == path]
+
+
+@pytest.fixture
+def plan(tmp_path) -> results.Plan:
+    """A plan whose scenes were rendered and scored already."""
+    scores = score(make_report_sequence(tmp_path / "made"), pictures=False)
+    plan = results.Plan("0:4", {"made": "48x32"}, 256, 8, 8, 0, ("cut",), tmp_path, False)
+    plan.__dict__["pairs"] = {"made": (scores, scores)}
+    plan.__dict__["others"] = {"a scene": scores}
+    return plan
+
+
+def test_tables_hold_the_scores_and_what_they_stand_on(plan):
+    scores = plan.pairs["made"][1]
+    noisy_db, floor = scores.methods["input"]["psnr_srgb"], scores.reference_floor_db
+    stands_on = (f"`made`: frames 0:4 at 48x32, reference 256 spp (noise floor {floor:.1f} dB), "
+                 f"seed 7, input {noisy_db:.2f} dB")
+    for make in (results.summary, results.all_scores, results.others):
+        assert stands_on in make(plan)
+        assert "clipped sRGB" in make(plan)
+        assert f"| {noisy_db:.2f} " in make(plan)
+
+
+def test_writing_replaces_one_block_and_no_more():
+    page = "a\n<!-- results:x -->\nold\n<!-- /results -->\nb\n<!-- results:y -->\n<!-- /results -->"
+    new = results.block("x", "new \\1", "make results")
+    assert results.replaced(page, "x", new) == page.replace(
+        "<!-- results:x -->\nold\n<!-- /results -->", new)
+    with pytest.raises(InputError, match="results:z"):
+        results.replaced(page, "z", new)
+
+
+@pytest.mark.slow
+def test_results_render_denoise_and_score(tmp_path, capsys):
+    arguments = ["--parts", "summary,lead", "--frames", "0:2", "--box-size", "32x32",
+                 "--room-size", "32x18", "--reference-spp", "4", "--data", str(tmp_path)]
+    results.results.main(arguments, standalone_mode=False)
+    first = capsys.readouterr()
+    assert "| **`onespp`** |" in first.out
+    assert "room_plain: denoise onespp" in first.err
+    results.scores_in.cache_clear()
+    results.results.main(arguments, standalone_mode=False)
+    again = capsys.readouterr()
+    assert again.out == first.out
+    assert "denoise" not in again.err
+
+
+def test_peers_are_listed():
+    assert all(f"`{name}`" in from_code.peers() for name in PEERS)
