@@ -35,7 +35,7 @@ from .lanes import OnLanes
 from .parameters import check_positive, check_range, check_whole
 from .stencil import Float, Planes, Stencil, Step, Taps, window
 from .surface import Surface
-from .svgf import Svgf
+from .svgf import Svgf, added_up
 
 STRATUM = 3          # pixels, side
 _LEAST = 1e-6        # radiance; darker samples say nothing
@@ -78,7 +78,7 @@ class Asvgf(Svgf):
         lights, texture = self.read_lights(frame, color, state.stencil)
         changes = state.gradients.find(frame, len(lights), self.gradient_scale)
         filtered, state = self.filter_lights(frame, lights, surface, state, changes)
-        return texture.restore([sum(c[1:], c[0]) for c in zip(*filtered)]), state
+        return texture.restore(added_up(filtered)), state
 
 
 @dataclass(frozen=True)
@@ -96,8 +96,8 @@ class Gradients:
     strata: Stencil
     planes: Planes
     taps: list[Taps]
-    steps: list[Step]
-    spread: Step
+    steps: list[Step[..., Any]]
+    spread: Step[..., Any]
 
     @staticmethod
     def make(stencil: Stencil, levels: int) -> Gradients:

@@ -132,8 +132,8 @@ class AtrousState:
     blur_taps: Taps
     variance_taps: tuple[Taps, Taps]
     spacings: list[Float]
-    variance_step: Step
-    level_steps: list[Step]
+    variance_step: Step[..., Any]
+    level_steps: list[Step[..., Any]]
 
 
 def estimate_variance(signal: Taps, guides: Taps, plane: list[Float]) -> Float:

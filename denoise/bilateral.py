@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 
@@ -123,7 +124,7 @@ class BilateralState:
     planes: Planes
     rows: list[Taps]
     squares: list[Float]
-    step: Step
+    step: Step[..., Any]
 
 
 def add_row_of_taps(taps: Taps, center: list[Float], sums: list[Float],

@@ -182,7 +182,7 @@ class Level:
 
     taps: tuple[Taps, Taps]
     spacing: Float
-    step: Step
+    step: Step[..., Any]
 
     @staticmethod
     def make(i: int, values: Planes, count: int, surfaces: Planes,
@@ -208,10 +208,10 @@ class Works:
     around: list[Level]
     smoothing: list[Level]
     levels: list[Level]
-    follow_shadows: Step
-    look_back: Step
-    merge: Step
-    pack: Step
+    follow_shadows: Step[..., Any]
+    look_back: Step[..., Any]
+    merge: Step[..., Any]
+    pack: Step[..., Any]
 
     @staticmethod
     def make(method: FilteredInnovation, stencil: Stencil, sizes: tuple[int, ...],

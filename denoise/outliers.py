@@ -110,7 +110,7 @@ class OutlierState:
     guides: Planes
     signal_taps: Taps
     guide_taps: Taps
-    clamp: Step
+    clamp: Step[..., Any]
     before: float = 0.0
     after: float = 0.0
 

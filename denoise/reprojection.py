@@ -157,7 +157,7 @@ class Place:
 
 
 def locate(stencil: Stencil, surface: list[Float], table: Float, dual: list[Float],
-           plane_tolerance: Float, shift: Sequence[Float] = (0, 0)) -> Place:
+           plane_tolerance: Float, shift: Sequence[Float | int] = (0, 0)) -> Place:
     """Follow each surface back; surface: ID, normal (3), depth. Others as of `motion_between`.
 
     Args:

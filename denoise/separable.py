@@ -17,6 +17,7 @@ it keeps more of the taps that the noise would have put off, and fewer across an
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 
@@ -64,4 +65,4 @@ class SeparableState:
     stencil: Stencil
     planes: Planes
     passes: list[Taps]
-    steps: list[Step]
+    steps: list[Step[..., Any]]

@@ -10,7 +10,8 @@ A kernel here runs over the *lanes* of a grid: the h rows of an image, each foll
   of 16 lanes costs as much as 15 such loads. On CUDA, where neighbouring gathers coalesce, it is a
   gather with an offset that the kernel takes as an argument. The `gather` layout also runs on
   the CPU, where the tests compare it with the views. It has not been run on a GPU.
-- A **step** is a traced function that is recorded once and replayed (`dr.freeze`).
+- A **step** is a traced function that is recorded once and replayed (`dr.freeze`). It takes and
+  returns named structures of arrays (`structure.py`).
 
 A kernel's results are fresh arrays, one number a lane. `Planes.store` copies them into planes: a
 scatter would cost five times as much, and in a frozen function it silently writes to a copy.
@@ -23,7 +24,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import ModuleType
-from typing import Any
+from typing import Any, Generic, ParamSpec, TypeVar, cast
 
 import drjit as dr
 import numpy as np
@@ -31,7 +32,11 @@ import numpy as np
 from render import backend
 from render.errors import InputError
 
-Float = Any  # a one-dimensional array of drjit.llvm or drjit.cuda, known at run time
+from .arrays import Float
+from .structure import Form, build, flatten
+
+P = ParamSpec("P")
+R = TypeVar("R")
 Offset = tuple[int, int]
 
 _TAIL = 64  # floats after the last lane that a vector load may touch
@@ -318,32 +323,45 @@ class Taps:
         return [dr.gather(type(plane), plane, lane) for plane in self.planes]
 
 
-class Step:
-    """A function of Dr.Jit arrays and taps, recorded at its first call and replayed after that.
+class Step(Generic[P, R]):
+    """A function of structures of Dr.Jit arrays and taps, recorded at its first call and replayed
+    after that.
+
+    An argument is a `structure` (`structure.py`): an array, None, taps, or a NamedTuple, tuple or
+    list of such; so is the result, but without taps. Another form, such as None where there was an
+    array, or other numbers of lanes, record again.
 
     Make one for each grid and each place it is called from: a recording holds the size of the
-    grid, and which of its arguments share memory. Other numbers of lanes record again.
+    grid, and which of its arguments share memory.
+
+    Raises:
+        TypeError: at a call, where an argument holds something else. A number that a kernel takes
+            is an array too (`Stencil.opaque`): otherwise it would be recorded. Of a result,
+            Dr.Jit makes it the cause of its RuntimeError.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        call = _Call()
+    def __init__(self, function: Callable[P, R]) -> None:
+        call, traced = _Call(), cast("Callable[..., R]", function)
 
-        def record(*arrays: Any) -> Any:
-            return function(*(a.seen_as(b) if isinstance(a, Taps) else b
-                              for a, b in zip(call.arguments, arrays)))
+        def record(arrays: list[Any], taps: list[list[Any]]) -> list[Any]:
+            seen = [a.seen_as(b) for a, b in zip(call.taps, taps, strict=True)]
+            arguments = build(call.form, arrays, seen)
+            results = flatten(traced(*arguments))
+            call.results[call.form] = results.form
+            return results.arrays
 
         self._call = call
-        self._frozen = dr.freeze(record, state_fn=lambda *_: _sizes(*call.arguments),
-                                 warn_after=1000)
+        self._frozen = dr.freeze(record, state_fn=lambda *_: call.form, warn_after=1000)
 
-    def __call__(self, *arguments: Any) -> Any:
-        self._call.arguments = arguments
+    def __call__(self, *arguments: P.args, **_: P.kwargs) -> R:
+        call = self._call
+        call.form, arrays, call.taps = flatten(arguments)
         try:
             with _no_collection():
-                # Dr.Jit walks lists twice as fast as it walks dataclasses.
-                return self._frozen(*(a.arrays if isinstance(a, Taps) else a for a in arguments))
+                results = self._frozen(arrays, [taps.arrays for taps in call.taps])
         finally:
-            self._call.arguments = ()
+            call.taps = []
+        return build(call.results[call.form], results)
 
     @property
     def recordings(self) -> int:
@@ -351,10 +369,14 @@ class Step:
 
 
 class _Call:
-    """The arguments of the call that is being made. Dr.Jit walks all that a recorded function's
-    closure holds, at every call, but not into an object such as this."""
+    """The call that is being made: its taps and form; and the form of the results by the form of
+    the arguments. Dr.Jit walks all that a recorded function's closure holds, at every call, but not
+    into an object such as this."""
 
-    arguments: tuple[Any, ...] = ()
+    def __init__(self) -> None:
+        self.taps: list[Taps] = []
+        self.form: Form = ()
+        self.results: dict[Form, Form] = {}
 
 
 @contextmanager
@@ -368,8 +390,3 @@ def _no_collection() -> Iterator[None]:
     finally:
         if enabled:
             gc.enable()
-
-
-def _sizes(*arguments: Any) -> tuple[int, ...]:
-    return tuple(a.lanes if isinstance(a, Taps) else dr.width(a[0]) for a in arguments
-                 if isinstance(a, Taps) or (isinstance(a, list) and a))

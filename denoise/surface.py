@@ -21,7 +21,8 @@ import numpy as np
 from render.errors import InputError
 from render.frame import Frame
 
-from .stencil import Float, Stencil
+from .arrays import Bool, Float
+from .stencil import Stencil
 
 GUIDES = ("normal", "depth", "id")
 LUMINANCE = (0.2126, 0.7152, 0.0722)
@@ -40,7 +41,7 @@ class Surface:
         plane_distance: n . X, the (negative) distance of the camera from the tangent plane.
     """
 
-    exists: Float
+    exists: Bool
     normal: list[Float]
     position: list[Float]
     depth: Float

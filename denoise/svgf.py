@@ -95,7 +95,7 @@ class Svgf(OnLanes):
         """`color` is used where the frame is one signal."""
         lights, texture = self.read_lights(frame, color, state.stencil)
         filtered, state = self.filter_lights(frame, lights, surface, state, [])
-        return texture.restore([sum(c[1:], c[0]) for c in zip(*filtered)]), state
+        return texture.restore(added_up(filtered)), state
 
     def read_lights(self, frame: Frame, color: list[Float],
                     stencil: Stencil) -> tuple[list[list[Float]], Texture]:
@@ -153,15 +153,23 @@ class Svgf(OnLanes):
                                previous=without_images(frame))
 
 
+def added_up(lights: list[list[Float]]) -> list[Float]:
+    """The sum of signals, (r, g, b) each."""
+    total = lights[0]
+    for light in lights[1:]:
+        total = [a + b for a, b in zip(total, light, strict=True)]
+    return total
+
+
 @dataclass(frozen=True)
 class Works:
     """Planes of the guides (n, z), the recorded steps, and a filter for each signal."""
 
     guides: Planes
-    accumulate: Step
-    estimate: Step
+    accumulate: Step[..., Any]
+    estimate: Step[..., Any]
     filters: list[Levels]
-    pack: Step
+    pack: Step[..., Any]
 
     @staticmethod
     def make(method: Svgf, stencil: Stencil, count: int) -> Works:
@@ -197,8 +205,8 @@ class Levels:
     blur_taps: Taps
     level_taps: list[tuple[Taps, Taps]]
     spacings: list[Float]
-    scale_steps: list[Step]
-    level_steps: list[Step]
+    scale_steps: list[Step[..., Any]]
+    level_steps: list[Step[..., Any]]
 
     @staticmethod
     def make(stencil: Stencil, guides: Planes, levels: int) -> Levels:

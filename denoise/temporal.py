@@ -90,9 +90,9 @@ class TemporalState:
 
     stencil: Stencil
     row_moments: RowMoments
-    blend: Step
+    blend: Step[..., Any]
     previous: Frame | None = None
-    history: Float = field(default=None, repr=False)
+    history: Float | None = field(default=None, repr=False)
 
     def after(self, frame: Frame, history: Float) -> TemporalState:
         """The state for the frame after `frame`; of that one only the matrices are kept."""

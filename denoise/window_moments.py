@@ -23,7 +23,7 @@ class RowMoments:
 
     planes: Planes
     taps: Taps
-    step: Step
+    step: Step[..., Any]
 
     @staticmethod
     def make(stencil: Stencil, radius: int) -> RowMoments:

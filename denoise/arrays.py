@@ -1,0 +1,25 @@
+"""The types of Dr.Jit arrays, for annotations, and a vector of three.
+
+A kernel is written once for the CPU and for CUDA; which of the two is known at run time. Both
+offer the same operations with the same signatures, so type checkers are given those of the CPU.
+At run time the names stand for anything: importing this module loads neither.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from drjit.llvm import Array4f, ArrayXf, Bool, Float, Int, UInt
+else:
+    Array4f = ArrayXf = Bool = Float = Int = UInt = Any
+
+__all__ = ["Array4f", "ArrayXf", "Bool", "Float", "Int", "UInt", "Vector3"]
+
+
+class Vector3(NamedTuple):
+    """Three arrays of lanes: a direction, a position or a colour."""
+
+    x: Float
+    y: Float
+    z: Float
