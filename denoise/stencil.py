@@ -33,10 +33,12 @@ from render import backend
 from render.errors import InputError
 
 from .arrays import Float
-from .structure import Form, build, flatten
+from .structure import Form, arrays_of, build, flatten
 
 P = ParamSpec("P")
 R = TypeVar("R")
+T = TypeVar("T")
+Named = TypeVar("Named")
 Offset = tuple[int, int]
 
 _TAIL = 64  # floats after the last lane that a vector load may touch
@@ -165,7 +167,7 @@ class Stencil:
             words += list(dr.gather(self.ArrayXf, packed, at, shape=(_GATHERED, self.lanes)))
         return words[:count]
 
-    def rows_around(self, arrays: Sequence[Float], margin: int) -> Taps:
+    def rows_around(self, arrays: Sequence[Float], margin: int) -> Taps[list[Float]]:
         """A kernel's results, evaluated over `margin` rows more on either side, seen from the
         2 margin + 1 rows around each pixel: taps without a copy."""
         starts = [row * self.stride for row in range(2 * margin + 1)]
@@ -173,12 +175,13 @@ class Stencil:
             return self.gathers(arrays, starts, self.lanes)
         memory = [array.numpy() for array in arrays]
         return Taps([[self.Float(m[start:start + self.lanes]) for m in memory] for start in starts],
-                    [], [], self.lanes, self.backend)
+                    [], [], self.lanes, self.backend, _listed)
 
-    def gathers(self, arrays: Sequence[Float], starts: Sequence[int], lanes: int) -> Taps:
+    def gathers(self, arrays: Sequence[Float], starts: Sequence[int],
+                lanes: int) -> Taps[list[Float]]:
         """Taps of the `gather` layout: arrays from each start on."""
         return Taps([], list(arrays), [dr.opaque(self.UInt, start) for start in starts], lanes,
-                    self.backend)
+                    self.backend, _listed)
 
     def constant(self, value: float) -> Float:
         """An array of lanes that holds one number."""
@@ -220,14 +223,15 @@ class Planes:
             else:
                 self._arrays.append(dr.opaque(stencil.Float, float(value), stencil.size))
 
-    def store(self, arrays: Sequence[Float], first: int = 0, gutters: bool = False) -> None:
+    def store(self, values: Any, first: int = 0, gutters: bool = False) -> None:
         """Copy evaluated arrays of lanes into planes from `first` on.
 
         Args:
+            values: a structure of arrays (`structure.py`), depth first.
             gutters: copy those too, a quarter quicker: where another plane, which keeps its own,
                 takes their weight away, so that they need only be finite.
         """
-        s = self.stencil
+        s, arrays = self.stencil, arrays_of(values)
         if s.layout == "gather":
             lane = dr.arange(s.UInt, s.lanes)
             inside = True if gutters else lane % s.stride < s.width
@@ -242,7 +246,7 @@ class Planes:
                 np.copyto(s.rows(target), s.rows(array.numpy()))
 
     def taps(self, offsets: Sequence[Offset], channels: Sequence[int] | None = None,
-             margin: int = 0) -> Taps:
+             margin: int = 0) -> Taps[list[Float]]:
         """Planes (default: all) seen from the neighbours at offsets (dy, dx).
 
         Args:
@@ -257,7 +261,7 @@ class Planes:
         if s.layout == "gather":
             return s.gathers([self._arrays[c] for c in channels], starts, lanes)
         return Taps([[self._view(c, start, lanes) for c in channels] for start in starts], [], [],
-                    lanes, s.backend)
+                    lanes, s.backend, _listed)
 
     def _view(self, channel: int, start: int, lanes: int) -> Float:
         """The same offset gives the same variable, so that a frozen function sees the alias."""
@@ -285,14 +289,20 @@ def _allocate(size: int, value: float, index: int, shift: int) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Taps:
-    """Planes at a few offsets: `taps.at(t)` lists the planes as seen from the t-th neighbour."""
+class Taps(Generic[T]):
+    """Planes at a few offsets: `taps.at(t)` is the planes as seen from the t-th neighbour, a list
+    unless they were `named`."""
 
     views: list[list[Float]]
     planes: list[Float]
     starts: list[Any]
     lanes: int
     backend: dr.JitBackend
+    make: Callable[..., T]
+
+    def named(self, make: Callable[..., Named]) -> Taps[Named]:
+        """The same taps, of which `at` gives make(*planes), such as a NamedTuple."""
+        return Taps(self.views, self.planes, self.starts, self.lanes, self.backend, make)
 
     def __len__(self) -> int:
         return len(self.views) or len(self.starts)
@@ -302,7 +312,7 @@ class Taps:
         """All arrays that a kernel must be given."""
         return self.views or [self.planes, self.starts]
 
-    def seen_as(self, arrays: list[list[Float]]) -> Taps:
+    def seen_as(self, arrays: list[list[Float]]) -> Taps[T]:
         """The same taps of arrays that stand for these."""
         if self.views:
             return replace(self, views=arrays)
@@ -316,11 +326,15 @@ class Taps:
         """
         dr.detail.new_scope(self.backend)
 
-    def at(self, t: int) -> list[Float]:
+    def at(self, t: int) -> T:
         if self.views:
-            return self.views[t]
+            return self.make(*self.views[t])
         lane = dr.arange(type(self.starts[t]), self.lanes) + self.starts[t]
-        return [dr.gather(type(plane), plane, lane) for plane in self.planes]
+        return self.make(*[dr.gather(type(plane), plane, lane) for plane in self.planes])
+
+
+def _listed(*planes: Float) -> list[Float]:
+    return list(planes)
 
 
 class Step(Generic[P, R]):

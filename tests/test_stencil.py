@@ -24,6 +24,11 @@ from render.errors import InputError
 LAYOUTS = ("views", "gather")
 
 
+class Point(NamedTuple):
+    x: object
+    y: object
+
+
 def stencil_of(height, width, reach, layout="views"):
     return Stencil(height, width, reach, "llvm", layout)
 
@@ -84,6 +89,22 @@ def test_rows_around_are_views_of_what_a_kernel_gave(layout):
     del array, tall
     gc.collect()
     assert np.isfinite(taps.at(4)[0].numpy()).all()  # memory that is still there
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_named_taps_in_a_step(layout):
+    """Planes filled from a structure come back as another one."""
+    stencil = stencil_of(2, 3, 1, layout)
+    planes = stencil.planes([-1.0, -2.0, -3.0])
+    planes.store([Point(stencil.constant(1), None), (stencil.constant(2), stencil.constant(3))])
+    taps = planes.taps([(0, 0), (0, 1)]).named(lambda x, y, z: Point(x, Point(y, z)))
+    step = Step(lambda taps: Point(taps.at(0).x, taps.at(1).y.x * 10 + taps.at(1).y.y))
+    for _ in range(2):
+        here, right = step(taps)
+        np.testing.assert_array_equal(stencil.image([here]), 1)
+        np.testing.assert_array_equal(stencil.image([right]), [[23, 23, -23]] * 2)
+    (some,) = planes.taps([(0, 0)], [2]).named(lambda z: [z]).at(0)
+    np.testing.assert_array_equal(stencil.image([some]), 3)
 
 
 def test_storing_again_is_seen_by_taps_made_before():
@@ -196,11 +217,6 @@ def test_dr_jit_walks_the_arguments_of_a_step_once():
 
     assert not holds(inputs[0]["nonlocals"])
     assert not holds(inputs[0]["globals"])
-
-
-class Point(NamedTuple):
-    x: object
-    y: object
 
 
 class Pair(NamedTuple):
