@@ -1,4 +1,4 @@
-"""The types of Dr.Jit arrays, for annotations, and a vector of three.
+"""The types of Dr.Jit arrays, for annotations, and vectors of three.
 
 A kernel is written once for the CPU and for CUDA; which of the two is known at run time. Both
 offer the same operations with the same signatures, so type checkers are given those of the CPU.
@@ -14,12 +14,28 @@ if TYPE_CHECKING:
 else:
     Array4f = ArrayXf = Bool = Float = Int = UInt = Any
 
-__all__ = ["Array4f", "ArrayXf", "Bool", "Float", "Int", "UInt", "Vector3"]
+__all__ = ["Array4f", "ArrayXf", "Bool", "Float", "Int", "UInt", "Vector3", "Matrix3", "Color"]
 
 
 class Vector3(NamedTuple):
-    """Three arrays of lanes: a direction, a position or a colour."""
+    """A direction or a position."""
 
     x: Float
     y: Float
     z: Float
+
+
+class Matrix3(NamedTuple):
+    """A 3x3 matrix, row by row."""
+
+    x: Vector3
+    y: Vector3
+    z: Vector3
+
+
+class Color(NamedTuple):
+    """Linear Rec. 709."""
+
+    red: Float
+    green: Float
+    blue: Float

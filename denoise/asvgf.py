@@ -29,11 +29,13 @@ import numpy as np
 from render.channels import REPLAY
 from render.frame import Frame
 
+from .arrays import Color, Float
 from .atrous import LARGEST_LEVELS, SPLINE
 from .history import RecordState
 from .lanes import OnLanes
 from .parameters import check_positive, check_range, check_whole
-from .stencil import Float, Planes, Stencil, Step, Taps, window
+from .stencil import Planes, Stencil, Step, Taps, window
+from .structure import evaluate
 from .surface import Surface
 from .svgf import Svgf, added_up
 
@@ -73,12 +75,12 @@ class Asvgf(Svgf):
     def alphas(self, count: int) -> list[float]:
         return [self.alpha, self.alpha_indirect][:count]
 
-    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
-                 state: Any) -> tuple[list[Float], Any]:
+    def on_lanes(self, frame: Frame, color: Color, surface: Surface,
+                 state: Any) -> tuple[Color, Any]:
         lights, texture = self.read_lights(frame, color, state.stencil)
         changes = state.gradients.find(frame, len(lights), self.gradient_scale)
         filtered, state = self.filter_lights(frame, lights, surface, state, changes)
-        return texture.restore(added_up(filtered)), state
+        return texture.modulate(added_up(filtered)), state
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ class Gradients:
     def find(self, frame: Frame, count: int, scale: float) -> list[Float]:
         """lambda of each of `count` signals, on the lanes of the image's stencil."""
         sums = self.strata.load(gather_strata(frame["replay"], frame["replay_before"], count))
-        dr.eval(sums)
+        evaluate(sums)
         for taps, step in zip(self.taps, self.steps, strict=True):
             self.planes.store(sums)
             sums = step(taps, sums)

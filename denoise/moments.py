@@ -21,11 +21,13 @@ from typing import Any
 
 import drjit as dr
 
+from .arrays import Float
 from .exponential import exp2
 from .history import look_up
-from .reprojection import locate
+from .reprojection import Motion, locate
 from .sparse import weighted_sums, window_taps
-from .stencil import Float, Stencil
+from .stencil import Stencil
+from .surface import SurfaceSample
 from .wavelet import geometry_exponent
 
 FORGETTING = 10      # power of 1 - lambda that a length is multiplied by
@@ -34,16 +36,15 @@ RADIUS = 3           # pixels, of the window of the spatial estimate
 VALUES = 5           # a signal's in a record: r, l, b, m1, m2
 
 
-def accumulate(stencil: Stencil, fallback: bool, signal: list[Float], surface: list[Float],
-               table: list[Float], dual: list[Float], records: list[Float],
+def accumulate(stencil: Stencil, fallback: bool, signal: list[Float], surface: SurfaceSample,
+               motion: Motion, records: Float,
                changes: list[Float], alphas: list[Float],
                numbers: list[Float]) -> tuple[list[Float], list[Float], list[Float]]:
     """Blend with the history.
 
     Args:
-        signal: three arrays a signal. surface: ID, normal (3), depth.
-        table, dual: as for `reprojection.reproject`. records: `history.pack_records` of the
-            lengths and `VALUES` a signal.
+        signal: three arrays a signal. motion: of `reprojection.motion_between`.
+        records: `history.pack_records` of the lengths and `VALUES` a signal.
         changes: lambda of each signal, which then has a length of its own; or none.
         alphas: of each signal. numbers: alpha_moments, longest, min_cosine, plane_tolerance.
     Returns:
@@ -51,9 +52,9 @@ def accumulate(stencil: Stencil, fallback: bool, signal: list[Float], surface: l
     """
     alpha_moments, longest, min_cosine, tolerance = numbers
     signals = [signal[i:i + 3] for i in range(0, len(signal), 3)]
-    place = locate(stencil, surface, table[0], dual, tolerance)
+    place = locate(stencil, surface, motion, tolerance)
     count = max(len(changes), 1)
-    old, found = look_up(stencil, place, records[0], count + VALUES * len(signals), min_cosine,
+    old, found = look_up(stencil, place, records, count + VALUES * len(signals), min_cosine,
                          fallback)
     colors, moments, lengths = [], [], []
     for s, (r, y, b) in enumerate(signals):

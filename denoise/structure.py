@@ -8,11 +8,12 @@ flat lists, each with a *form*, from which `build` makes the structure again.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple, TypeVar
 
 import drjit as dr
 
+S = TypeVar("S")
 Form = tuple[Any, ...]
 """A structure without its arrays, in the order of `flatten`: the class of a NamedTuple; list or
 tuple, then its length; None; for an array its width; the class of taps, then their lanes."""
@@ -55,6 +56,12 @@ def build(form: Form, arrays: Iterable[Any], taps: Iterable[Any] = ()) -> Any:
 def arrays_of(*structures: Any) -> list[Any]:
     """The arrays of some structures, depth first."""
     return flatten(structures).arrays
+
+
+def mapped(function: Callable[..., Any], structure: S, *others: Any) -> S:
+    """A structure of what a function makes of the arrays of structures of one form."""
+    form, arrays, _ = flatten(structure)
+    return build(form, [function(*a) for a in zip(arrays, *map(arrays_of, others), strict=True)])
 
 
 def evaluate(*structures: Any) -> None:

@@ -161,11 +161,11 @@ def test_texture_and_emission_come_back_as_they_were(options):
 
 def test_five_frames_one_recording_a_step():
     _, state = run_and_keep(Svgf(levels=3), moving(9, 11, count=6))
-    works = state.works
-    steps = [works.accumulate, works.estimate, works.pack]
-    for part in works.filters:
+    passes = state.passes
+    steps = [passes.accumulate, passes.estimate, passes.pack]
+    for part in passes.filters:
         steps += [*part.scale_steps, *part.level_steps]
-    assert len(works.filters) == 2
+    assert len(passes.filters) == 2
     assert [step.recordings for step in steps] == [1] * 15
 
 
