@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 else:
     Array4f = ArrayXf = Bool = Float = Int = UInt = Any
 
-__all__ = ["Array4f", "ArrayXf", "Bool", "Float", "Int", "UInt", "Vector3", "Matrix3", "Color"]
+__all__ = ["Array4f", "ArrayXf", "Bool", "Color", "Float", "Int", "Matrix3", "UInt", "Vector3"]
 
 
 class Vector3(NamedTuple):

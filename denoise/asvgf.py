@@ -54,7 +54,7 @@ class Asvgf(Svgf):
     """
 
     alpha: float = 0.02
-    longest: float = 256.0
+    max_history_length: float = 256.0
     alpha_indirect: float = 0.01
     gradient_levels: int = 3
     gradient_scale: float = 1.0

@@ -13,7 +13,7 @@ from render.command import device_option, threads_option, use
 from render.errors import InputError
 from render.lock import writing
 from render.sequence import Sequence
-from render.terminal import command_line, progress
+from render.terminal import command_line, note, progress
 
 from .parameters import pairs
 
@@ -65,7 +65,7 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
     if name and len(chosen) > 1:
         raise InputError(f"--name {name} is one name for {len(chosen)} methods: give one --method")
     denoisers = {name or (method if outliers is None else f"{method}+outliers"):
-                 build(method, pairs(settings), outliers) for method in chosen}
+                 build(method, pairs(settings), outliers, note) for method in chosen}
     for name, denoiser in denoisers.items():
         if set(REPLAY) & set(denoiser.needs) - set(sequence.manifest.channels):
             raise InputError(f"{name} needs the channels {' and '.join(REPLAY)}, which {folder} "

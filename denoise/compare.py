@@ -29,6 +29,7 @@ from render.errors import InputError
 from render.json_file import JsonFile, format_json
 
 from .metrics import Metric
+from .parameters import present_parameters
 from .scorecard import MethodScore, Scores
 from .stability import MEASURES
 from .table import PLAIN_WIDTH
@@ -203,7 +204,8 @@ def _notes(a: Scores, b: Scores) -> Iterator[str]:
         if alone:
             yield f"Only {which} has {', '.join(alone)}."
     for name in (n for n in a.ordered() if n in b.methods):
-        if a.methods[name].parameters != b.methods[name].parameters:
+        mine, others = (present_parameters(s.methods[name].parameters) for s in (a, b))
+        if mine != others:
             yield f"{name} has other parameters in B."
 
 

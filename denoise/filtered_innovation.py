@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Any, ClassVar, TypeVar
 
 import drjit as dr
@@ -38,7 +37,7 @@ from .innovation import (
     to_smooth,
 )
 from .lanes import OnLanes
-from .parameters import check_positive, check_range, check_whole
+from .parameters import INNOVATION_RENAMED, check_positive, check_range, check_whole
 from .reprojection import ReprojectionTests, motion_between, without_images
 from .shadow_motion import (
     SPREAD_LEVEL,
@@ -113,11 +112,7 @@ class FilteredInnovation(OnLanes):
     follow_shadows: bool = True
 
     uses: ClassVar[tuple[str, ...]] = (*USED, *SHADOW)
-    renamed: ClassVar[Mapping[str, str]] = MappingProxyType({
-        "follow": "min_gain", "doubt": "noise_threshold", "sharp_follow": "sharp_min_gain",
-        "renewal": "change_alpha", "smoothing": "innovation_levels", "levels": "output_levels",
-        "sharp_smoothing": "sharp_innovation_levels", "sharp_levels": "sharp_output_levels",
-        "fade": "fade_frames", "longest": "max_history_length"})
+    renamed: ClassVar[Mapping[str, str]] = INNOVATION_RENAMED
 
     def __post_init__(self) -> None:
         for name, least in (("innovation_levels", ENERGY_LEVELS), ("output_levels", 1)):

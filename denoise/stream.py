@@ -28,6 +28,7 @@ from render.versions import versions
 from .memory import PeakMemory
 from .methods import Method, channels_read, parameters
 from .outliers import energy_kept
+from .parameters import present_parameters
 from .timing import timed
 
 ALONE = 8  # frames that nothing else runs beside
@@ -162,6 +163,6 @@ def _remove_stale(sequence: Sequence, run: Run) -> None:
     """Drop results that this run would otherwise be mixed with: others', and a killed run's."""
     if run.method in sequence.methods():
         old = sequence.read_run(run.method)
-        if (old.parameters, old.versions) == (run.parameters, run.versions):
+        if (present_parameters(old.parameters), old.versions) == (run.parameters, run.versions):
             return
     sequence.remove_results(run.method)

@@ -6,7 +6,8 @@ by it removes what noise is left (`wavelet.py`). The first level's output is the
 history.
 
 Source: Schied et al. 2017, "Spatiotemporal variance-guided filtering: real-time reconstruction for
-path-traced global illumination". Defaults are its constants; `longest` is 32 in NVIDIA's pass.
+path-traced global illumination". Defaults are its constants; `max_history_length` is 32 in NVIDIA's
+pass.
 
 Departures, beside those that the three modules list:
 - A frame without direct and indirect light (an import) is one signal, its colour.
@@ -15,7 +16,7 @@ Departures, beside those that the three modules list:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -29,7 +30,7 @@ from .demodulation import Texture, read_texture
 from .history import RecordState, no_history, pack_records
 from .lanes import OnLanes
 from .moments import SHORT, accumulate, estimate_variances
-from .parameters import check_positive, check_range, check_whole
+from .parameters import HISTORY_RENAMED, check_positive, check_range, check_whole
 from .reprojection import Motion, motion_between, without_images
 from .sparse import tabulate
 from .stencil import Planes, Stencil, Step, Taps, window
@@ -46,9 +47,9 @@ class Svgf(OnLanes):
 
     Attributes:
         alpha, alpha_moments: least weight of the current frame in colour and in moments.
-        longest: history length that is not exceeded, frames.
+        max_history_length: frames.
         levels: 1 to 8; the last one's taps lie 2^(levels - 1) pixels apart.
-        sigma_luminance: in deviations. sigma_depth: in slopes of the surface.
+        sigma_luminance: in standard deviations. sigma_depth: in slopes of the surface.
         normal_power: exponent of the cosine between normals.
         min_cosine, plane_tolerance: tests of history, see `reprojection.py`.
 
@@ -61,7 +62,7 @@ class Svgf(OnLanes):
 
     alpha: float = 0.2
     alpha_moments: float = 0.2
-    longest: float = 32.0
+    max_history_length: float = 32.0
     levels: int = 5
     sigma_luminance: float = 4.0
     sigma_depth: float = 1.0
@@ -76,12 +77,13 @@ class Svgf(OnLanes):
     feedback: bool = True
 
     uses: ClassVar[tuple[str, ...]] = SIGNALS
+    renamed: ClassVar[Mapping[str, str]] = HISTORY_RENAMED
 
     def __post_init__(self) -> None:
         check_whole(self, "levels", LARGEST_LEVELS)
         for name in ("alpha", "alpha_moments"):
             check_range(self, name, 1e-6, 1.0)
-        check_range(self, "longest", 1.0, 1e6)
+        check_range(self, "max_history_length", 1.0, 1e6)
         check_range(self, "min_cosine", -1.0, 1.0)
         check_positive(self, "sigma_luminance", "sigma_depth", "normal_power", "plane_tolerance")
 
@@ -132,13 +134,14 @@ class Svgf(OnLanes):
         guides = read_guides(stencil, surface, self.sigma_depth)
         evaluate(signal, near, guides)
         passes.guides.store(guides[:4])
-        numbers = [stencil.opaque(x) for x in (self.alpha_moments, self.longest, self.min_cosine,
-                                               self.plane_tolerance)]
+        numbers = [stencil.opaque(x) for x in (self.alpha_moments, self.max_history_length,
+                                               self.min_cosine, self.plane_tolerance)]
         colors, moments, lengths, window = passes.accumulate(
             signal, near, motion, state.records, guides, changes,
             [stencil.opaque(a) for a in self.alphas(len(lights))], numbers)
         half_power = stencil.opaque(LOG2E * self.normal_power / 2)
-        enough = stencil.opaque(SHORT if self.temporal_variance else 2 * self.longest + 1)
+        enough = stencil.opaque(SHORT if self.temporal_variance
+                                else 2 * self.max_history_length + 1)
         variances = passes.estimate(moments, lengths, guides, [window], [half_power, enough])
         numbers = [stencil.opaque(EPSILON), stencil.opaque(self.sigma_luminance / LOG2E),
                    half_power]
