@@ -14,10 +14,11 @@ from typing import Any
 
 from render.frame import Frame
 
+from .arrays import Color
 from .atrous import Atrous
 from .bilateral import Bilateral
 from .lanes import OnLanes
-from .stencil import Float, Stencil
+from .stencil import Stencil
 from .surface import Surface
 from .temporal import Temporal, TemporalState
 
@@ -44,8 +45,8 @@ class _Filtered(OnLanes):
     def init_on(self, stencil: Stencil) -> FilteredState:
         return FilteredState(stencil, self.filter.init_on(stencil), self.history.init_on(stencil))
 
-    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
-                 state: FilteredState) -> tuple[list[Float], FilteredState]:
+    def on_lanes(self, frame: Frame, color: Color, surface: Surface,
+                 state: FilteredState) -> tuple[Color, FilteredState]:
         filtered, _ = self.filter.on_lanes(frame, color, surface, state.filter)
         result, history = self.history.on_lanes(frame, filtered, surface, state.history)
         return result, replace(state, history=history)

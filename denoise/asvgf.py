@@ -29,13 +29,15 @@ import numpy as np
 from render.channels import REPLAY
 from render.frame import Frame
 
+from .arrays import Color, Float
 from .atrous import LARGEST_LEVELS, SPLINE
 from .history import RecordState
 from .lanes import OnLanes
 from .parameters import check_positive, check_range, check_whole
-from .stencil import Float, Planes, Stencil, Step, Taps, window
+from .stencil import Planes, Stencil, Step, Taps, window
+from .structure import evaluate
 from .surface import Surface
-from .svgf import Svgf
+from .svgf import Svgf, added_up
 
 STRATUM = 3          # pixels, side
 _LEAST = 1e-6        # radiance; darker samples say nothing
@@ -61,7 +63,7 @@ class Asvgf(Svgf):
     """
 
     alpha: float = 0.02
-    longest: float = 256.0
+    max_history_length: float = 256.0
     alpha_indirect: float = 0.01
     gradient_levels: int = 3
     gradient_scale: float = 1.0
@@ -82,12 +84,12 @@ class Asvgf(Svgf):
     def alphas(self, count: int) -> list[float]:
         return [self.alpha, self.alpha_indirect][:count]
 
-    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
-                 state: Any) -> tuple[list[Float], Any]:
+    def on_lanes(self, frame: Frame, color: Color, surface: Surface,
+                 state: Any) -> tuple[Color, Any]:
         lights, texture = self.read_lights(frame, color, state.stencil)
         changes = state.gradients.find(frame, len(lights), self.gradient_scale)
         filtered, state = self.filter_lights(frame, lights, surface, state, changes)
-        return texture.restore([sum(c[1:], c[0]) for c in zip(*filtered)]), state
+        return texture.modulate(added_up(filtered)), state
 
 
 @dataclass(frozen=True)
@@ -105,8 +107,8 @@ class Gradients:
     strata: Stencil
     planes: Planes
     taps: list[Taps]
-    steps: list[Step]
-    spread: Step
+    steps: list[Step[..., Any]]
+    spread: Step[..., Any]
 
     @staticmethod
     def make(stencil: Stencil, levels: int) -> Gradients:
@@ -123,7 +125,7 @@ class Gradients:
     def find(self, frame: Frame, count: int, scale: float) -> list[Float]:
         """lambda of each of `count` signals, on the lanes of the image's stencil."""
         sums = self.strata.load(gather_strata(frame["replay"], frame["replay_before"], count))
-        dr.eval(sums)
+        evaluate(sums)
         for taps, step in zip(self.taps, self.steps, strict=True):
             self.planes.store(sums)
             sums = step(taps, sums)

@@ -32,6 +32,7 @@ out of the three at the end, with an error of 1e-7 times the brightest of them.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,11 +40,13 @@ import drjit as dr
 
 from render.frame import Frame
 
+from .arrays import Color, Float
 from .demodulation import read_texture
 from .exponential import exp2
 from .lanes import OnLanes
 from .parameters import check_positive, check_whole
-from .stencil import Float, Stencil, Step, Taps, window
+from .stencil import Stencil, Step, Taps, window
+from .structure import evaluate
 from .surface import LUMINANCE, Surface, luminance
 
 LOG2E = 1.4426950408889634
@@ -101,19 +104,19 @@ class Atrous(OnLanes):
                            [stencil.opaque(1 << i) for i in range(self.levels)],
                            Step(estimate_variance), [Step(level) for _ in range(self.levels)])
 
-    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
-                 state: AtrousState) -> tuple[list[Float], AtrousState]:
+    def on_lanes(self, frame: Frame, color: Color, surface: Surface,
+                 state: AtrousState) -> tuple[Color, AtrousState]:
         stencil = state.stencil
         texture = read_texture(frame, stencil, self.demodulate)
-        light = texture.remove(color)
+        light = texture.demodulate(color)
         float_t = stencil.Float
-        normal = [dr.select(surface.exists, n, m) for n, m in zip(surface.normal, (1, 0, 0))]
-        inverse_depth = dr.select(surface.exists, surface.inverse_depth, float_t(BACKGROUND))
-        scale = dr.select(surface.exists, dr.abs(surface.plane_distance)
+        normal = [dr.select(surface.is_valid, n, m) for n, m in zip(surface.normal, (1, 0, 0))]
+        inverse_depth = dr.select(surface.is_valid, surface.inverse_depth, float_t(BACKGROUND))
+        scale = dr.select(surface.is_valid, dr.abs(surface.plane_distance)
                           * stencil.opaque(1 / self.sigma_plane), float_t(_BACKGROUND_SCALE))
-        guides, plane = [*normal, inverse_depth], [*surface.plane, scale]
-        light = [light[0], luminance(light), light[2]]
-        dr.eval(light, guides, plane)
+        guides, plane = [*normal, inverse_depth], [*surface.slope, scale]
+        light = [light.red, luminance(light), light.blue]
+        evaluate(light, guides, plane)
         state.guides.store(guides)
         state.signal.store(light, gutters=True)
         signal = [*light, state.variance_step(*state.variance_taps, plane)]
@@ -126,7 +129,7 @@ class Atrous(OnLanes):
                 state.signal.store(signal[3:], first=3)
             signal = state.level_steps[i](state.blur_taps, *state.level_taps[i], signal[3:], plane,
                                           [state.spacings[i], *numbers])
-        return texture.restore(with_green(signal)), state
+        return texture.modulate(with_green(signal)), state
 
 
 @dataclass(frozen=True)
@@ -141,8 +144,8 @@ class AtrousState:
     blur_taps: Taps
     variance_taps: tuple[Taps, Taps]
     spacings: list[Float]
-    variance_step: Step
-    level_steps: list[Step]
+    variance_step: Step[..., Any]
+    level_steps: list[Step[..., Any]]
 
 
 def estimate_variance(signal: Taps, guides: Taps, plane: list[Float]) -> Float:
@@ -185,7 +188,7 @@ def level(blur: Taps, signal: Taps, guides: Taps, variance: list[Float], plane: 
     """
     spacing, epsilon, sigma, q = numbers
     scale_of_l = luminance_scale(blur, variance, [epsilon, sigma])
-    dr.eval(scale_of_l)
+    evaluate(scale_of_l)
     return filter_level(signal, guides, plane, scale_of_l, spacing, q)
 
 
@@ -222,8 +225,8 @@ def filter_level(signal: Taps, guides: Taps, plane: list[Float], scale_of_l: Flo
     return [r * norm, y * norm, b * norm, v * norm * norm]
 
 
-def with_green(signal: list[Float]) -> list[Float]:
+def with_green(signal: Sequence[Float]) -> Color:
     """(r, g, b) of (r, luminance, b, ...)."""
     r, y, b, *_ = signal
     red, green, blue = LUMINANCE
-    return [r, dr.fma(r, -red / green, dr.fma(b, -blue / green, y * (1 / green))), b]
+    return Color(r, dr.fma(r, -red / green, dr.fma(b, -blue / green, y * (1 / green))), b)

@@ -24,16 +24,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 
 from render.frame import Frame
 
+from .arrays import Color, Float
 from .demodulation import read_texture
 from .exponential import exp2
 from .lanes import OnLanes
 from .parameters import check_positive, check_whole
-from .stencil import Float, Planes, Stencil, Step, Taps
+from .stencil import Planes, Stencil, Step, Taps
+from .structure import evaluate
 from .surface import Surface
 
 LOG2E = 1.4426950408889634
@@ -89,26 +92,27 @@ class Bilateral(OnLanes):
         squares = [stencil.opaque(dy * dy) for dy in window]
         return BilateralState(stencil, planes, rows, squares, Step(add_row_of_taps))
 
-    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
-                 state: BilateralState) -> tuple[list[Float], BilateralState]:
+    def on_lanes(self, frame: Frame, color: Color, surface: Surface,
+                 state: BilateralState) -> tuple[Color, BilateralState]:
         stencil = state.stencil
         texture = read_texture(frame, stencil, self.demodulate)
-        center, weights = self.prepare(texture.remove(color), surface, state.planes)
+        center, weights = self.prepare(texture.demodulate(color), surface, state.planes)
         sums = [stencil.constant(0) for _ in range(4)]
         for taps, square in zip(state.rows, state.squares, strict=True):
             sums = state.step(taps, center, sums, [*weights, square])
-        return texture.restore(self.mean(sums, stencil)), state
+        return texture.modulate(self.mean(sums, stencil)), state
 
-    def prepare(self, light: list[Float], surface: Surface,
+    def prepare(self, light: Color, surface: Surface,
                 planes: Planes) -> tuple[list[Float], list[Float]]:
         """Fill the planes; `center` and `weights` of `add_row_of_taps`, these without dy^2."""
         stencil = planes.stencil
         k = stencil.opaque(self.color_scale)
-        kind = dr.select(surface.exists, stencil.Float(_KIND), -_KIND)
-        pixels = [c * k for c in light] + surface.normal + [kind] + surface.position
-        own_kind = dr.select(surface.exists, stencil.Float(_KIND), -_KIND * self.isolate_background)
-        self_product = dr.fma(own_kind, own_kind, dr.select(surface.exists, stencil.Float(1), 0))
-        dr.eval(pixels, own_kind, self_product)
+        kind = dr.select(surface.is_valid, stencil.Float(_KIND), -_KIND)
+        pixels = [*(c * k for c in light), *surface.normal, kind, *surface.position]
+        own_kind = dr.select(surface.is_valid, stencil.Float(_KIND),
+                             -_KIND * self.isolate_background)
+        self_product = dr.fma(own_kind, own_kind, dr.select(surface.is_valid, stencil.Float(1), 0))
+        evaluate(pixels, own_kind, self_product)
         planes.store(pixels)
         half_log2e = LOG2E / 2
         weights = ([stencil.opaque(-half_log2e / self.sigma_coord**2)]
@@ -121,10 +125,10 @@ class Bilateral(OnLanes):
         """Of colours in the planes, so that the square of a difference is its exponent of 2."""
         return math.sqrt(LOG2E / 2) / self.sigma_color
 
-    def mean(self, sums: list[Float], stencil: Stencil) -> list[Float]:
+    def mean(self, sums: list[Float], stencil: Stencil) -> Color:
         """Colour from the sums of w times scaled colour, and of w."""
         norm = 1 / (sums[3] * stencil.opaque(self.color_scale))
-        return [s * norm for s in sums[:3]]
+        return Color(*[s * norm for s in sums[:3]])
 
 
 @dataclass(frozen=True)
@@ -135,7 +139,7 @@ class BilateralState:
     planes: Planes
     rows: list[Taps]
     squares: list[Float]
-    step: Step
+    step: Step[..., Any]
 
 
 def add_row_of_taps(taps: Taps, center: list[Float], sums: list[Float],

@@ -16,7 +16,7 @@ from render.errors import InputError
 from render.games202_files import gaps
 from render.lock import writing
 from render.sequence import Sequence
-from render.terminal import command_line, progress
+from render.terminal import command_line, note, progress
 
 from .parameters import pairs
 
@@ -72,7 +72,7 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
     if name is not None and len(chosen) > 1:
         raise InputError(f"--name {name} is one name for {len(chosen)} methods: give one --method")
     denoisers = {method + (OUTLIERS if outliers is not None else "") if name is None else name:
-                 build(method, pairs(settings), outliers) for method in chosen}
+                 build(method, pairs(settings), outliers, note) for method in chosen}
     for name, denoiser in denoisers.items():
         if set(REPLAY) & set(denoiser.needs) - set(sequence.manifest.channels):
             raise InputError(f"{name} needs the channels {' and '.join(REPLAY)}, which {folder} "

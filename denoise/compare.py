@@ -30,6 +30,7 @@ from render.json_file import JsonFile, format_json
 
 from .means import identical
 from .metrics import Metric
+from .parameters import present_parameters
 from .scorecard import MethodScore, Scores
 from .stability import MEASURES
 from .table import PLAIN_WIDTH
@@ -217,7 +218,8 @@ def _notes(a: Scores, b: Scores) -> Iterator[str]:
         old, new = a.methods[name].method, b.methods[name].method
         if old and new and old != new:
             yield f"{name} is {old} in A and {new} in B."
-        if a.methods[name].parameters != b.methods[name].parameters:
+        mine, others = (present_parameters(s.methods[name].parameters) for s in (a, b))
+        if mine != others:
             yield f"{name} has other parameters in B."
 
 

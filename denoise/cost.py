@@ -9,6 +9,7 @@ from render.manifest import Run
 from render.sequence import Sequence
 
 from .interleave import Times
+from .parameters import present_parameters
 
 STARTING = 3  # frames in which kernels compile: a history's are first needed in the second
 
@@ -24,7 +25,8 @@ def cost(sequence: Sequence, run: Run | None, times: Times | None) -> dict[str, 
     height, width = sequence.size
     measured = times.methods.get(run.method) if times else None
     interleaved = (times is not None and measured is not None
-                   and measured.parameters == run.parameters
+                   and present_parameters(measured.parameters)
+                   == present_parameters(run.parameters)
                    and (times.size, times.device) == ((width, height), run.device))
     warm = measured.ms if measured and interleaved else median(ms[1:]) if ms[1:] else None
     return {"method": name, "changed": changed, "ms_per_frame": warm,
@@ -32,7 +34,7 @@ def cost(sequence: Sequence, run: Run | None, times: Times | None) -> dict[str, 
             "startup_ms": startup(ms), "peak_mb": run.peak_mb,
             "megapixels_per_s": width * height / warm / 1e3 if warm else None,
             "device": run.device, "machine": run.machine, "threads": run.threads,
-            "parameters": run.parameters, "versions": run.versions}
+            "parameters": present_parameters(run.parameters), "versions": run.versions}
 
 
 def startup(ms: list[float]) -> float | None:

@@ -11,14 +11,14 @@ mirror, in renderers that write 0 there) counts as albedo 1.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import numpy as np
 
 from render.frame import Frame
 
-from .stencil import Float, Stencil
+from .arrays import Bool, Color
+from .stencil import Stencil
 
 CHANNELS = ("albedo", "emission")  # used where a frame has them
 SMALLEST_ALBEDO = 1e-2
@@ -26,38 +26,43 @@ SMALLEST_ALBEDO = 1e-2
 
 @dataclass(frozen=True)
 class Texture:
-    """What was taken out, as arrays of lanes; empty lists: nothing.
+    """What is taken out, None where a frame does not have it.
 
     black: mask of surfaces darker than the floor, None where there is no albedo.
     """
 
-    albedo: list[Float]
-    emission: list[Float]
-    black: Any = None
+    albedo: Color | None = None
+    emission: Color | None = None
+    black: Bool | None = None
 
-    def remove(self, color: list[Float]) -> list[Float]:
-        light = [c - e for c, e in zip(color, self.emission)] if self.emission else color
-        return [c / a for c, a in zip(light, self.albedo)] if self.albedo else light
+    def demodulate(self, color: Color) -> Color:
+        """The light that makes a colour on this texture."""
+        if self.emission:
+            color = Color(*[c - e for c, e in zip(color, self.emission)])
+        return Color(*[c / a for c, a in zip(color, self.albedo)]) if self.albedo else color
 
-    def restore(self, light: list[Float]) -> list[Float]:
-        color = [c * a for c, a in zip(light, self.albedo)] if self.albedo else light
-        return [c + e for c, e in zip(color, self.emission)] if self.emission else color
+    def modulate(self, light: Color) -> Color:
+        """The colour that light makes on this texture."""
+        if self.albedo:
+            light = Color(*[c * a for c, a in zip(light, self.albedo)])
+        return Color(*[c + e for c, e in zip(light, self.emission)]) if self.emission else light
 
 
-def read_texture(frame: Frame, stencil: Stencil, wanted: bool) -> Texture:
+def read_texture(frame: Frame, stencil: Stencil, demodulate: bool) -> Texture:
     """Albedo and emission of a frame, where it has them; nothing if it has no albedo.
 
     Values that are not finite count as albedo 1 and emission 0.
     """
-    if not wanted or "albedo" not in frame:
-        return Texture([], [])
+    if not demodulate or "albedo" not in frame:
+        return Texture()
     albedo = stencil.load(np.asarray(frame["albedo"], np.float32))
     albedo = [dr.select(dr.abs(a) < 1e6, a, 1) for a in albedo]
     dark = [a < SMALLEST_ALBEDO for a in albedo]
     black = dark[0] & dark[1] & dark[2]
     floor = dr.select(black, stencil.Float(1), SMALLEST_ALBEDO)
-    albedo = [dr.select(d, floor, a) for d, a in zip(dark, albedo)]
+    albedo = Color(*[dr.select(d, floor, a) for d, a in zip(dark, albedo)])
     if "emission" not in frame:
-        return Texture(albedo, [], black)
+        return Texture(albedo, None, black)
     emission = stencil.load(np.asarray(frame["emission"], np.float32))
-    return Texture(albedo, [dr.select(dr.abs(e) < 1e18, e, 0) for e in emission], black)
+    emission = Color(*[dr.select(dr.abs(e) < 1e18, e, 0) for e in emission])
+    return Texture(albedo, emission, black)

@@ -11,42 +11,54 @@ Parameters were found by measurement: see `tune.py`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import drjit as dr
 
 from render.channels import SHADOW
 from render.frame import Frame
 
+from .arrays import Bool, Color, Float, Vector3
 from .atrous import BACKGROUND, LARGEST_LEVELS, LOG2E
 from .history import RecordState, no_history
 from .innovation import (
-    ENERGY_LEVELS,
-    guided_level,
-    look_back,
+    Gains,
+    Innovations,
+    Merged,
+    OutputFalloff,
+    SurfaceTap,
+    innovations,
     merge,
+    output_level,
     pack_history,
     smooth_level,
+    to_smooth,
 )
 from .lanes import OnLanes
-from .parameters import check_positive, check_range, check_whole
-from .reprojection import motion_between, without_images
+from .parameters import INNOVATION_RENAMED, check_positive, check_range, check_whole
+from .reprojection import ReprojectionTests, motion_between, without_images
 from .shadow_motion import (
-    AROUND,
-    CHOICE,
+    SPREAD_LEVEL,
+    ShadowRays,
+    Shadows,
     follow_shadows,
     has_shadow_rays,
     read_shadow_rays,
 )
-from .signals import USED, Signals, check_signals, read_signals
-from .stencil import Float, Planes, Stencil, Step, Taps, window
-from .surface import Surface
+from .signal_layout import ENERGY_LEVELS, History, PlaneRule, SignalLayout, Smoothed
+from .signals import USED, Signal, SignalKind, read_signals
+from .stencil import Planes, Stencil, Step, Taps, window
+from .structure import arrays_of, build, evaluate, flatten
+from .surface import Surface, SurfaceSample, TangentPlane
 
 _OUTSIDE = -1e15          # 1/z outside the image
 _BLACK = 2 * BACKGROUND   # 1/z of a surface that reflects nothing: a lamp
 _BACKGROUND_SCALE = 1e3   # |k| / sigma_plane of background and lamps, whose like alone count
+_SHADOW_PLANES = 5        # of `Shadows`
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -55,42 +67,43 @@ class FilteredInnovation(OnLanes):
 
     Attributes:
         light_alpha, visibility_alpha: least weight of the current frame in high frequencies.
-        follow: least share of the smoothed innovation that diffuse light takes, above 0 to 1;
+        min_gain: least share of the smoothed innovation that diffuse light takes, above 0 to 1;
             all of it where frames have no visibility.
-        doubt: how many variances of it count as noise.
-        sharp_follow: least share of it that visibility and glossy light take.
-        renewal: weight of the current frame in visibility's high frequencies where the change of
-            the low ones is certain.
-        smoothing, levels: of diffuse light, levels of the innovation's smoothing, and of the last
-            filter while there is no history; the last of these fades out over `fade` frames.
-        sharp_smoothing, sharp_levels: the same of visibility and of glossy light.
-        light_sigma, visibility_sigma: of luminance in the last filter, deviations.
+        noise_threshold: how many variances of it count as noise.
+        sharp_min_gain: least share of it that visibility and glossy light take.
+        change_alpha: weight of the current frame in visibility's high frequencies where the change
+            of the low ones is certain.
+        innovation_levels, output_levels: of diffuse light, levels of the innovation's smoothing,
+            and of the last filter while there is no history; the last of these fades out over
+            `fade_frames` frames.
+        sharp_innovation_levels, sharp_output_levels: the same of visibility and of glossy light.
+        light_sigma, visibility_sigma: of luminance in the last filter, standard deviations.
         sigma_plane: distance from the tangent plane over depth.
-        longest: history length that is not exceeded, frames.
+        max_history_length: frames.
         min_cosine, plane_tolerance: tests of history, see `reprojection.py`.
         demodulate: filter diffuse light without texture, where frames have albedo.
         gloss: glossy light as a signal of its own, where frames have it.
-        penumbra: reach of the smoothing of visibility, and of its last filter: a level's deviation
-            in widths of the penumbra.
+        penumbra: reach of the smoothing of visibility, and of its last filter: a level's standard
+            deviation in widths of the penumbra.
         follow_shadows: visibility's history where the shadow was, and `penumbra`; where frames
             have shadow rays.
     """
 
     light_alpha: float = 0.05
     visibility_alpha: float = 0.15
-    follow: float = 0.55
-    doubt: float = 4.0
-    sharp_follow: float = 0.75
-    renewal: float = 0.6
-    smoothing: int = 5
-    levels: int = 4
-    sharp_smoothing: int = 3
-    sharp_levels: int = 3
+    min_gain: float = 0.55
+    noise_threshold: float = 4.0
+    sharp_min_gain: float = 0.75
+    change_alpha: float = 0.6
+    innovation_levels: int = 5
+    output_levels: int = 4
+    sharp_innovation_levels: int = 3
+    sharp_output_levels: int = 3
     light_sigma: float = 8.0
     visibility_sigma: float = 6.0
-    fade: float = 4.0
+    fade_frames: float = 4.0
     sigma_plane: float = 0.005
-    longest: float = 64.0
+    max_history_length: float = 64.0
     min_cosine: float = 0.5
     plane_tolerance: float = 0.02
     demodulate: bool = True
@@ -99,188 +112,194 @@ class FilteredInnovation(OnLanes):
     follow_shadows: bool = True
 
     uses: ClassVar[tuple[str, ...]] = (*USED, *SHADOW)
+    renamed: ClassVar[Mapping[str, str]] = INNOVATION_RENAMED
 
     def __post_init__(self) -> None:
-        for name, least in (("smoothing", ENERGY_LEVELS), ("levels", 1)):
+        for name, least in (("innovation_levels", ENERGY_LEVELS), ("output_levels", 1)):
             check_whole(self, name, LARGEST_LEVELS, least)
             check_whole(self, f"sharp_{name}", getattr(self, name), least)
-        for name in ("light_alpha", "visibility_alpha", "follow", "sharp_follow"):
+        for name in ("light_alpha", "visibility_alpha", "min_gain", "sharp_min_gain"):
             check_range(self, name, 1e-6, 1.0)
-        check_range(self, "renewal", 0.0, 1.0)
-        check_range(self, "doubt", 0.0, 1e6)
-        check_range(self, "longest", 1.0, 1e6)
+        check_range(self, "change_alpha", 0.0, 1.0)
+        check_range(self, "noise_threshold", 0.0, 1e6)
+        check_range(self, "max_history_length", 1.0, 1e6)
         check_range(self, "min_cosine", -1.0, 1.0)
-        check_positive(self, "light_sigma", "visibility_sigma", "fade", "sigma_plane",
+        check_positive(self, "light_sigma", "visibility_sigma", "fade_frames", "sigma_plane",
                        "penumbra", "plane_tolerance")
 
     @property
     def reach(self) -> int:
-        return 1 << (max(self.smoothing, self.levels, 1 + max(AROUND)) - 1)
+        return 1 << max(self.innovation_levels - 1, self.output_levels - 1, SPREAD_LEVEL)
 
     def init_on(self, stencil: Stencil) -> RecordState:
         return RecordState(stencil, no_history(stencil))
 
-    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
-                 state: RecordState) -> tuple[list[Float], RecordState]:
+    def on_lanes(self, frame: Frame, color: Color, surface: Surface,
+                 state: RecordState) -> tuple[Color, RecordState]:
         """`color` is used where the frame has no direct and indirect light."""
-        stencil = state.stencil
-        table, dual = motion_between(state.previous or frame, frame, stencil)
-        signals = read_signals(frame, color, stencil, self.demodulate, self.gloss)
+        stencil, previous, sample = state.stencil, state.previous or frame, surface.sample
+        motion = motion_between(previous, frame, stencil)
+        light = read_signals(frame, color, stencil, self.demodulate, self.gloss)
+        signals, plane = light.listed, self._tangent_plane(surface, light.texture.black, stencil)
         rays = None
-        if self.follow_shadows and signals.unshadowed and has_shadow_rays(frame):
-            rays = read_shadow_rays(frame, state.previous or frame, stencil)
-        works = state.works or Works.make(self, stencil, signals.sizes, rays is not None)
-        check_signals(frame, (works.sizes, works.shadows), (signals.sizes, rays is not None))
-        signal = [plane for part in signals.parts for plane in part]
-        near = [surface.id, *surface.normal, surface.depth]
-        inverse_depth, plane = self._guides(surface, signals, stencil)
-        guides, id_ = [inverse_depth, *plane], stencil.Float(surface.id)
-        dr.eval(signal, near, guides, id_, (rays.hits, surface.position) if rays else [])
+        if self.follow_shadows and light.unshadowed and has_shadow_rays(frame):
+            rays = read_shadow_rays(frame, previous, stencil)
+        layout = self._layout(light.kinds, rays is not None)
+        passes = state.passes or Passes.make(stencil, layout)
+        passes.layout.check(frame, layout)
+        id_ = stencil.Float(sample.id)
+        evaluate(signals, sample, plane, id_, (rays, surface.position) if rays else None)
 
-        limits = [stencil.opaque(x) for x in (
-            self.min_cosine, self.plane_tolerance, self.longest, LOG2E / (2 * self.penumbra**2))]
-        works.surfaces.store([inverse_depth, id_])
-        shadows = []
-        if rays:
-            shadows = works.through(works.around, works.follow_shadows(
-                rays.hits, near, surface.position, rays.table, rays.sizes, rays.matrices), plane)
-        innovation, energies, carried, seen, other, narrow = works.look_back(
-            signal, near, guides, [table], dual, [state.records], shadows, limits)
-        works.surfaces.store(seen)
-        smooth, energies = works.smooth_innovation(innovation, energies, other, plane, narrow)
-        # Without visibility apart, diffuse light has the shadows in it, which are quick.
-        follow = self.follow if signals.unshadowed else 1.0
-        numbers = [stencil.opaque(x) for x in (
-            follow, self.doubt, self.sharp_follow, self.renewal, self.fade,
-            *_each(works.sizes, self.light_alpha, self.visibility_alpha))]
-        values, fade = works.merge(signal, innovation, smooth, energies, carried, other,
-                                   guides, numbers)
-        sigmas = [stencil.opaque(math.sqrt(LOG2E) / x)
-                  for x in _each(works.sizes, self.light_sigma, self.visibility_sigma)]
-        works.surfaces.store([inverse_depth])
-        parts = works.filter(values, plane, [*fade, *narrow], sigmas)
-        records = works.pack(near, carried[:1], values)
-        return signals.color(parts), replace(state, works=works, records=records,
+        passes.store_surface(id_, plane)
+        shadows = passes.spread_shadows(rays, sample, surface.position, plane)
+        found = passes.innovations(signals, sample, plane, motion, state.records, shadows,
+                                   *self._limits(stencil))
+        smoothed = passes.smooth_innovations(found, plane)
+        merged = passes.merge(signals, found, smoothed, plane, self._gains(stencil, layout))
+        output = passes.filter_output(merged, found, plane, self._sigmas(stencil, layout))
+        records = passes.pack(sample, History(found.length, merged.signals))
+        return light.color(output), replace(state, passes=passes, records=records,
                                             previous=without_images(frame))
 
-    def _guides(self, surface: Surface, signals: Signals,
-                stencil: Stencil) -> tuple[Float, list[Float]]:
-        """1/z, and its slopes (2) and scale; lamps and background are far away."""
-        exists = surface.exists
-        inverse_depth = dr.select(exists, surface.inverse_depth, stencil.Float(BACKGROUND))
+    def _layout(self, kinds: tuple[SignalKind, ...], has_shadow_rays: bool) -> SignalLayout:
+        return SignalLayout(kinds, has_shadow_rays, self.innovation_levels,
+                            self.sharp_innovation_levels, self.output_levels,
+                            self.sharp_output_levels)
+
+    def _tangent_plane(self, surface: Surface, black: Bool | None,
+                       stencil: Stencil) -> TangentPlane:
+        """Of each pixel; lamps, which are black, and background are far away."""
+        is_valid = surface.is_valid
+        inverse_depth = dr.select(is_valid, surface.inverse_depth, stencil.Float(BACKGROUND))
         scale = dr.abs(surface.plane_distance) * stencil.opaque(1 / self.sigma_plane)
-        if signals.texture.black is not None:
-            inverse_depth = dr.select(exists & signals.texture.black, _BLACK, inverse_depth)
-            exists &= ~signals.texture.black
-        scale = dr.select(exists, scale, stencil.Float(_BACKGROUND_SCALE))
-        return inverse_depth, [*(dr.select(exists, g, 0) for g in surface.plane), scale]
+        if black is not None:
+            inverse_depth = dr.select(is_valid & black, _BLACK, inverse_depth)
+            is_valid &= ~black
+        scale = dr.select(is_valid, scale, stencil.Float(_BACKGROUND_SCALE))
+        dx, dy = (dr.select(is_valid, slope, 0) for slope in surface.slope)
+        return TangentPlane(inverse_depth, dx, dy, scale)
+
+    def _limits(self, stencil: Stencil) -> tuple[ReprojectionTests, Float, Float]:
+        """Tests of history, its length, and the scale of `penumbra.footprint_falloff`."""
+        tests = ReprojectionTests(stencil.opaque(self.min_cosine),
+                                  stencil.opaque(self.plane_tolerance))
+        return (tests, stencil.opaque(self.max_history_length),
+                stencil.opaque(LOG2E / (2 * self.penumbra**2)))
+
+    def _gains(self, stencil: Stencil, layout: SignalLayout) -> Gains:
+        alphas = layout.each(self.light_alpha, self.visibility_alpha)
+        # Without visibility apart, diffuse light has the shadows in it, which are quick.
+        min_gain = self.min_gain if SignalKind.VISIBILITY in layout.kinds else 1.0
+        return Gains([stencil.opaque(alpha) for alpha in alphas], stencil.opaque(min_gain),
+                     stencil.opaque(self.noise_threshold), stencil.opaque(self.sharp_min_gain),
+                     stencil.opaque(self.change_alpha), stencil.opaque(self.fade_frames))
+
+    def _sigmas(self, stencil: Stencil, layout: SignalLayout) -> list[Float]:
+        """As the exponents of the last filter want them."""
+        return [stencil.opaque(math.sqrt(LOG2E) / sigma)
+                for sigma in layout.each(self.light_sigma, self.visibility_sigma)]
 
 
 @dataclass(frozen=True)
 class Level:
-    """A pass over the first planes: taps of values and of surfaces, and the recorded step."""
+    """A pass over the first planes: their taps and those of surfaces, and the recorded step."""
 
-    taps: tuple[Taps, Taps]
+    values: Taps
+    surfaces: Taps[SurfaceTap]
     spacing: Float
-    step: Step
+    step: Step[..., Any]
+    count: int
 
     @staticmethod
-    def make(i: int, values: Planes, count: int, surfaces: Planes,
-             function: Callable[..., list[Float]]) -> Level:
+    def make(i: int, planes: Planes, count: int, surfaces: Planes, inverse_depth: int,
+             function: Callable[..., Any], named: Callable[..., Any] | None = None) -> Level:
+        """Level i, over `count` planes; inverse_depth: which of the planes of `surfaces`."""
         offsets = [(dy << i, dx << i) for dy, dx in (*window(1), (0, 0))]
-        return Level((values.taps(offsets, range(count)), surfaces.taps(offsets)),
-                     values.stencil.opaque(1 << i), Step(function))
+        values = planes.taps(offsets, range(count))
+        return Level(values.named(named) if named else values,
+                     surfaces.taps(offsets, [inverse_depth, _ID]).named(SurfaceTap),
+                     planes.stencil.opaque(1 << i), Step(function), count)
+
+
+_ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH = range(3)  # planes of the surface
 
 
 @dataclass(frozen=True)
-class Works:
-    """Planes and steps for signals of these sizes, and for shadow rays or without.
+class Passes:
+    """The planes and recorded steps of a layout, and the passes that they are.
 
-    surfaces: 1/z (of what has a history, then of all) and ID. values: what is being filtered, in
-    the order of leaving: diffuse light goes through all levels, the sharp signals through fewer,
-    energies through the first ones. around: how a shadow's motion spreads.
+    Attributes:
+        surfaces: planes of object ID, 1/z, and 1/z of what has a history.
+        buffer: planes of what is being smoothed or filtered, see `signal_layout.py`.
     """
 
-    sizes: tuple[int, ...]
-    shadows: bool
+    stencil: Stencil
+    layout: SignalLayout
     surfaces: Planes
-    values: Planes
-    around: list[Level]
+    buffer: Planes
+    follow_shadows: Step[..., Shadows]
+    spread: Level
+    innovations: Step[..., Innovations]
     smoothing: list[Level]
-    levels: list[Level]
-    follow_shadows: Step
-    look_back: Step
-    merge: Step
-    pack: Step
+    merge: Step[..., Merged]
+    output: list[Level]
+    pack: Step[..., Float]
 
     @staticmethod
-    def make(method: FilteredInnovation, stencil: Stencil, sizes: tuple[int, ...],
-             shadows: bool) -> Works:
-        surfaces = stencil.planes([_OUTSIDE, -1.0])
-        leaving = [(1 + sizes[0], method.smoothing),
-                   (int(shadows), max(CHOICE, method.sharp_smoothing)),
-                   (sum(sizes[1:]) + int(shadows) + 1, method.sharp_smoothing),
-                   (len(sizes), ENERGY_LEVELS)]
-        spreads = 0, 1 + sizes[0] + int(shadows)
-        visibility = spreads[1] + sum(sizes[1:])
-        narrowed = (spreads[1], visibility, visibility + 1) if shadows else ()
-        values = stencil.planes([0.0] * sum(planes for planes, _ in leaving))
+    def make(stencil: Stencil, layout: SignalLayout) -> Passes:
+        surfaces = stencil.planes([-1.0, _OUTSIDE, _OUTSIDE])
+        buffer = stencil.planes([0.0] * len(layout.smoothing_rules))
 
         def smoothing(i: int) -> Level:
-            count = sum(planes for planes, levels in leaving if i < levels)
-            return Level.make(i, values, count, surfaces,
-                              lambda *a: smooth_level(spreads, narrowed, *a))
+            rules = layout.smoothing_level(i)
+            return Level.make(i, buffer, len(rules), surfaces, _VALID_INVERSE_DEPTH,
+                              lambda *a: smooth_level(rules, *a))
 
-        def around(i: int) -> Level:
-            return Level.make(i, values, 5, surfaces, lambda *a: smooth_level((), (), *a))
+        def output(i: int) -> Level:
+            kinds = layout.output_level(i)
+            return Level.make(i, buffer, layout.output_planes(kinds), surfaces, _INVERSE_DEPTH,
+                              lambda *a: output_level(layout, i, *a), layout.noisy_signals(kinds))
 
-        def last(i: int) -> Level:
-            some = sizes if i < method.sharp_levels else sizes[:1]
-            fading = (i == method.levels - 1, *[i == method.sharp_levels - 1] * (len(some) - 1))
-            return Level.make(i, values, sum(some) + len(some), surfaces,
-                              lambda *a: guided_level(some, fading, *a))
+        spread = [PlaneRule(SPREAD_LEVEL)] * _SHADOW_PLANES
+        return Passes(
+            stencil, layout, surfaces, buffer, Step(lambda *a: follow_shadows(stencil, *a)),
+            Level.make(SPREAD_LEVEL, buffer, _SHADOW_PLANES, surfaces, _INVERSE_DEPTH,
+                       lambda *a: smooth_level(spread, *a)),
+            Step(lambda *a: innovations(stencil, layout, *a)),
+            [smoothing(i) for i in range(layout.innovation_levels)],
+            Step(lambda *a: merge(stencil, layout, *a)),
+            [output(i) for i in range(layout.output_levels)],
+            Step(lambda *a: pack_history(stencil, layout, *a)))
 
-        return Works(
-            sizes, shadows, surfaces, values, [around(i) for i in AROUND],
-            [smoothing(i) for i in range(method.smoothing)],
-            [last(i) for i in range(method.levels)],
-            Step(lambda *a: follow_shadows(stencil, *a)),
-            Step(lambda *a: look_back(stencil, sizes, *a)),
-            Step(lambda *a: merge(stencil, sizes, *a)),
-            Step(lambda *a: pack_history(stencil, sizes, *a)))
+    def store_surface(self, id_: Float, plane: TangentPlane) -> None:
+        self.surfaces.store([id_, plane.inverse_depth])
 
-    def through(self, levels: list[Level], values: list[Float], plane: list[Float],
-                *numbers: list[Float]) -> list[Float]:
-        """Values after these levels, of which later ones may be of the first values alone."""
-        values = list(values)
+    def spread_shadows(self, rays: ShadowRays | None, surface: SurfaceSample, position: Vector3,
+                       plane: TangentPlane) -> Shadows | None:
+        """`follow_shadows`, and means of it over a few pixels around."""
+        if rays is None:
+            return None
+        return self._through([self.spread], self.follow_shadows(rays, surface, position), plane)
+
+    def smooth_innovations(self, found: Innovations, plane: TangentPlane) -> Smoothed:
+        """Q, S and W of the innovation, over pixels that have a history."""
+        self.surfaces.store(found.valid_inverse_depth, first=_VALID_INVERSE_DEPTH)
+        return self._through(self.smoothing, to_smooth(self.layout, found), plane,
+                             found.footprint_falloff)
+
+    def filter_output(self, merged: Merged, found: Innovations, plane: TangentPlane,
+                      sigmas: list[Float]) -> list[Signal]:
+        """The last filter of each signal."""
+        falloff = OutputFalloff(merged.fade, found.footprint_falloff)
+        filtered = self._through(self.output, merged.signals, plane, falloff, sigmas)
+        return [noisy.signal for noisy in filtered]
+
+    def _through(self, levels: list[Level], values: T, plane: TangentPlane,
+                 *arguments: Any) -> T:
+        """Values after these levels, of which later ones may be of the first planes alone."""
+        form, planes, _ = flatten(values)
         for level in levels:
-            count = len(level.taps[0].at(0))
-            self.values.store(values[:count], gutters=True)
-            values[:count] = level.step(*level.taps, plane, [level.spacing], *numbers)
-        return values
-
-    def smooth_innovation(self, innovation: list[Float], energies: list[Float],
-                          other: list[Float], plane: list[Float],
-                          narrow: list[Float]) -> tuple[list[Float], list[Float]]:
-        """Q, S of the innovation and of the other one, as `merge` wants them; W of its energies."""
-        parts = ([energies[0]], innovation[:self.sizes[0]], other[2:], [energies[-1]],
-                 innovation[self.sizes[0]:], other[:1], energies)
-        values, smooth = [x for part in parts for x in part], []
-        values = self.through(self.smoothing, values, plane, narrow)
-        for part in parts:
-            smooth.append(values[:len(part)])
-            values = values[len(part):]
-        spread, light, excess, last_spread, sharp, e, energies = smooth
-        return [*spread, *last_spread, *light, *sharp, *excess, *e], energies
-
-    def filter(self, values: list[Float], plane: list[Float], weaker: list[Float],
-               sigmas: list[Float]) -> list[list[Float]]:
-        """The last filter of each signal; values: planes of each signal and its variance."""
-        values = self.through(self.levels, values, plane, weaker, sigmas)
-        starts = [sum(self.sizes[:s]) + s for s in range(len(self.sizes))]
-        return [values[start:start + size] for start, size in zip(starts, self.sizes)]
-
-
-def _each(sizes: tuple[int, ...], light: Any, visibility: Any) -> list[Any]:
-    """A parameter of each signal, light or visibility."""
-    return [light if size == 3 else visibility for size in sizes]
+            self.buffer.store(planes[:level.count], gutters=True)
+            planes[:level.count] = arrays_of(level.step(level.values, level.surfaces, plane,
+                                                        level.spacing, *arguments))
+        return build(form, planes)

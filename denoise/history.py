@@ -11,18 +11,19 @@ Departure from SVGF: it tests the difference of depths, this the distance from t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 
 from render.frame import Frame
 
+from .arrays import Bool, Float, Vector3
 from .reprojection import LEAST_WEIGHT, Place
 from .sparse import weighted_sums
-from .stencil import Float, Stencil
-from .surface import dot
+from .stencil import Stencil
+from .structure import arrays_of
+from .surface import SurfaceSample, dot
 
 WORDS = 16          # floats in a record, one cache line
 MOST_VALUES = 12
@@ -35,12 +36,14 @@ def no_history(stencil: Stencil) -> Float:
     return dr.opaque(stencil.Float, _NOBODY, stencil.lanes * WORDS)
 
 
-def pack_records(stencil: Stencil, surface: list[Float], values: Sequence[Float]) -> Float:
-    """Records of a frame; surface: ID, normal (3), depth."""
-    if len(values) > MOST_VALUES:
-        raise ValueError(f"a record holds {MOST_VALUES} values, not {len(values)}")
-    id_, nx, ny, nz, depth = surface
-    words = [stencil.Float(id_) + dr.select(nz < 0, stencil.Float(0.5), 0), nx, ny, depth, *values]
+def pack_records(stencil: Stencil, surface: SurfaceSample, values: Any) -> Float:
+    """Records of a frame; values: a structure of arrays (`structure.py`), at most `MOST_VALUES`."""
+    arrays = arrays_of(values)
+    if len(arrays) > MOST_VALUES:
+        raise ValueError(f"a record holds {MOST_VALUES} values, not {len(arrays)}")
+    n = surface.normal
+    words = [stencil.Float(surface.id) + dr.select(n.z < 0, stencil.Float(0.5), 0), n.x, n.y,
+             surface.depth, *arrays]
     words += [stencil.Float(0)] * (WORDS - len(words))
     return stencil.pack(words)
 
@@ -52,17 +55,25 @@ class RecordState:
     stencil: Stencil
     records: Float = field(repr=False)
     previous: Frame | None = None
-    works: Any = None
+    passes: Any = None
+
+
+class LookUp(NamedTuple):
+    """Values of records, depth first as they were packed, and the mask of pixels that have some."""
+
+    values: list[Float]
+    is_valid: Bool
 
 
 def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosine: Float,
-            fallback: bool = False, wanted: Any = None) -> tuple[list[Float], Any]:
+            fallback: bool = False, active: Bool | None = None) -> LookUp:
     """The first `count` values of the previous frame's records where each pixel's surface was.
 
     Args:
-        wanted: mask of the pixels that ask, if they are few; the others get no history.
+        fallback: take the mean around, see the module's header.
+        active: mask of the pixels that ask, if they are few; the others get no history.
     Returns:
-        `count` arrays, 0 where there is no history, and the mask of where there is.
+        values that are 0 where there is no history.
     """
     float_t, int_t = stencil.Float, stencil.Int
 
@@ -75,8 +86,8 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
         head, nx, ny, depth = words[:_HEAD]
         id_ = dr.floor(head)
         nz = dr.sqrt(dr.maximum(dr.fma(-nx, nx, dr.fma(-ny, ny, 1)), 0))
-        normal = [nx, ny, dr.select(head == id_, nz, -nz)]
-        center = [float_t(column) + 0.5, float_t(row) + 0.5, float_t(1)]
+        normal = Vector3(nx, ny, dr.select(head == id_, nz, -nz))
+        center = Vector3(float_t(column) + 0.5, float_t(row) + 0.5, float_t(1))
         near = dr.abs(dr.fma(depth, dot(place.plane, center), -place.offset)) < place.nearness
         turned = dot(place.normal, normal) > min_cosine
         passes = on_screen & (id_ == place.id) & (place.rough | (near & turned))
@@ -90,7 +101,7 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
         weight = dr.abs(fx + (float_t(dx) - 1)) * dr.abs(fy + (float_t(dy) - 1))
         return dr.select(passes, weight, 0), values
 
-    if wanted is None:
+    if active is None:
         sums, total = [float_t(0)] * count, float_t(0)
         for dy in (0, 1):
             for dx in (0, 1):
@@ -98,7 +109,7 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
                 sums = [dr.fma(weight, v, s) for v, s in zip(values, sums)]
                 total += weight
     else:
-        total, sums = weighted_sums(stencil, wanted & place.inside, 4, count,
+        total, sums = weighted_sums(stencil, active & place.inside, 4, count,
                                     lambda i: corner(i >> 1, i & 1))
     if fallback:
         lacking = place.inside & (total < LEAST_WEIGHT)
@@ -113,4 +124,4 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
         total = dr.select(lacking, number, total)
     found = place.inside & (total >= LEAST_WEIGHT)
     scale = dr.select(found, 1 / dr.select(found, total, 1), 0)
-    return [s * scale for s in sums], found
+    return LookUp([s * scale for s in sums], found)

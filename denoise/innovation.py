@@ -46,213 +46,267 @@ the gradients of A-SVGF (Schied et al. 2018).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 
+from .arrays import Bool, Float
 from .atrous import EPSILON, LOG2E
 from .exponential import exp2
 from .history import look_up, pack_records
-from .penumbra import narrowness
-from .reprojection import locate
-from .shadow_motion import FEWEST, look_up_shadow
+from .penumbra import footprint_falloff
+from .reprojection import Motion, ReprojectionTests, locate
+from .shadow_motion import MIN_SHARE, Shadows, look_up_shadow
+from .signal_layout import History, NoisySignal, PlaneRule, SignalLayout, Smoothed
+from .signals import Signal, SignalKind
 from .sparse import tabulate, weighted_sums, window_taps
-from .stencil import Float, Offset, Stencil, Taps, window
+from .stencil import Offset, Stencil, Taps, window
+from .structure import mapped
+from .surface import SurfaceSample, TangentPlane
 
 BINOMIAL = {0: 1 / 2, 1: 1 / 4}
-ENERGY_LEVELS = 2
-LEAST_NOISE = 0.25    # share of the innovation's energy that is at least noise of d
-STRANGER = 0.4        # weight of a pixel of another object, beside its distance
-RADIUS = 2            # pixels, of the window of the spatial variance
-_NEVER = -1e3         # log2 of a weight that is 0
-_UNSEEN = -3e14       # 1/z of a pixel without history
-_MOST = 1e36          # squares of luminance stay below: sums of them must not overflow
-_LEAST = 1e-20        # square of a luminance that is taken for 0
+MIN_NOISE = 0.25               # share of the innovation's energy that is at least noise of d
+OTHER_OBJECT_WEIGHT = 0.4      # of a pixel of another object, beside its distance
+RADIUS = 2                     # pixels, of the window of the spatial variance
+_NEVER = -1e3                  # log2 of a weight that is 0
+_NO_HISTORY = -3e14            # 1/z of a pixel without history
+_MAX_ENERGY = 1e36             # squares of luminance stay below: sums of them must not overflow
+_MIN_ENERGY = 1e-20            # square of a luminance that is taken for 0
 
 
-def luma(size: int) -> int:
-    """Index of the luminance among the planes of a signal: (v) or (r, l, b)."""
-    return 1 if size == 3 else 0
+class ShadowInnovation(NamedTuple):
+    """Visibility's innovation from its shadow history, that history's variance, and how much
+    greater the square of the innovation is than that of the other one."""
+
+    innovation: Float
+    variance: Float
+    excess: Float
 
 
-def look_back(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], surface: list[Float],
-              guides: list[Float], motion: list[Float], dual: list[Float], records: list[Float],
-              shadows: list[Float], numbers: list[Float]) -> tuple[list[Float], ...]:
-    """The innovation.
+class Innovations(NamedTuple):
+    """What a frame's signals say that their history does not.
+
+    Attributes:
+        signals: e of each signal, 0 without history. energies: l(e)^2 of each.
+        length: n, 1 without history. variances: s^2 of each signal's history.
+        valid_inverse_depth: 1/z, far away without history.
+        shadow: of visibility's other history. footprint_falloff: of `penumbra.py`.
+            None without shadow rays, both.
+    """
+
+    signals: list[Signal]
+    energies: list[Float]
+    length: Float
+    variances: list[Float]
+    valid_inverse_depth: Float
+    shadow: ShadowInnovation | None
+    footprint_falloff: Float | None
+
+
+class Gains(NamedTuple):
+    """How history follows.
+
+    Attributes:
+        alphas: of each signal. min_gain: g. noise_threshold: k. sharp_min_gain: g'.
+        change_alpha: r. fade_frames: until the last filter has faded.
+    """
+
+    alphas: list[Float]
+    min_gain: Float
+    noise_threshold: Float
+    sharp_min_gain: Float
+    change_alpha: Float
+    fade_frames: Float
+
+
+class Merged(NamedTuple):
+    """The new history of each signal, and `fade_out`."""
+
+    signals: list[NoisySignal]
+    fade: Float
+
+
+class SurfaceTap(NamedTuple):
+    """What a tap is weighed by: 1/z, far away where the pixel does not count, and object ID."""
+
+    inverse_depth: Float
+    id: Float
+
+
+def innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signal],
+                surface: SurfaceSample, plane: TangentPlane, motion: Motion, records: Float,
+                shadows: Shadows | None, tests: ReprojectionTests, max_history_length: Float,
+                falloff_scale: Float) -> Innovations:
+    """The innovation of each signal.
 
     Args:
-        signal: planes of all signals. surface: ID, normal (3), depth. guides: 1/z, its slopes (2)
-            and scale. motion, dual: of `motion_between`. records: of `pack_history`.
-            shadows: of `follow_shadows`, smoothed, or empty. numbers: min_cosine,
-            plane_tolerance, longest, scale of `narrowness`.
-    Returns:
-        e, 0 without history; l(e)^2 a signal; n, then s^2 of each signal's history; 1/z, far away
-        without history; and, with `shadows`, e and s^2 of visibility's other history, and how much
-        greater its e^2 is; and `narrowness`.
+        motion: of `motion_between`. records: of `pack_history`.
+        shadows: of `follow_shadows`, smoothed. falloff_scale: of `penumbra.footprint_falloff`.
     """
-    min_cosine, tolerance, longest, scale = numbers
-    place = locate(stencil, surface, motion[0], dual, tolerance)
-    count, last = 1 + len(signal) + len(sizes), sizes[-1] + 1
-    words, found = look_up(stencil, place, records[0], count, min_cosine)
-    length, old = words[last], [*words[last + 1:], *words[:last]]
-    innovation, energies, variances, at = [], [], [], 0
-    for s, size in enumerate(sizes):
-        history = old[at + s:at + s + size]
-        e = [dr.select(found, a - b, 0) for a, b in zip(signal[at:at + size], history)]
-        innovation += e
-        energies.append(dr.minimum(dr.square(e[luma(size)]), _MOST))
-        variances.append(old[at + s + size])
-        at += size
-    length = dr.select(found, dr.minimum(length + 1, longest), 1)
-    seen, other = [dr.select(found, guides[0], _UNSEEN)], []
-    if shadows:
-        (v, variance), moves = look_up_shadow(stencil, surface, guides, motion, dual, records[0],
-                                              shadows, [min_cosine, tolerance])
-        moves &= found
-        e = dr.select(moves, signal[-1] - v, innovation[-1])
-        other = [e, dr.select(moves, variance, variances[-1]), dr.square(e) - energies[-1]]
-    narrow = [narrowness(shadows[3:], scale, FEWEST)] if shadows else []
-    return innovation, energies, [length, *variances], seen, other, narrow
+    place = locate(stencil, surface, motion, tests.plane_tolerance)
+    words, is_valid = look_up(stencil, place, records, layout.record_values, tests.min_cosine)
+    length, history = layout.unpack(words)
+    e = [mapped(lambda d, h: dr.select(is_valid, d - h, 0), signal, old.signal)
+         for signal, old in zip(signals, history, strict=True)]
+    energies = [dr.minimum(dr.square(s.luminance), _MAX_ENERGY) for s in e]
+    variances = [old.variance for old in history]
+    length = dr.select(is_valid, dr.minimum(length + 1, max_history_length), 1)
+    valid_inverse_depth = dr.select(is_valid, plane.inverse_depth, _NO_HISTORY)
+    if shadows is None:
+        return Innovations(e, energies, length, variances, valid_inverse_depth, None, None)
+    visibility, variance, moves = look_up_shadow(stencil, surface, plane, motion, records,
+                                                 shadows.motion, tests)
+    moves &= is_valid
+    other = dr.select(moves, signals[-1].luminance - visibility, e[-1].luminance)
+    shadow = ShadowInnovation(other, dr.select(moves, variance, variances[-1]),
+                              dr.square(other) - energies[-1])
+    return Innovations(e, energies, length, variances, valid_inverse_depth, shadow,
+                       footprint_falloff(shadows.penumbra, falloff_scale, MIN_SHARE))
 
 
-def pack_history(stencil: Stencil, sizes: tuple[int, ...], surface: list[Float],
-                 length: list[Float], values: list[Float]) -> Float:
-    """Records of a frame; values: planes and variance of each signal.
+def to_smooth(layout: SignalLayout, found: Innovations) -> Smoothed:
+    """What is smoothed of the innovation."""
+    has_visibility = SignalKind.VISIBILITY in layout.kinds
+    diffuse, *sharp = found.signals
+    return Smoothed(
+        diffuse_spread=found.energies[0], diffuse=diffuse,
+        excess=found.shadow.excess if found.shadow else None,
+        visibility_spread=found.energies[-1] if has_visibility else None, sharp=sharp,
+        shadow_innovation=found.shadow.innovation if found.shadow else None,
+        energies=found.energies)
 
-    The last signal comes first: visibility is looked up alone.
-    """
-    last = sizes[-1] + 1
-    return pack_records(stencil, surface, [*values[-last:], *length, *values[:-last]])
+
+def pack_history(stencil: Stencil, layout: SignalLayout, surface: SurfaceSample,
+                 history: History) -> Float:
+    """Records of a frame."""
+    return pack_records(stencil, surface, layout.pack(history))
 
 
-def smooth_level(spreads: Collection[int], narrowed: Collection[int], values: Taps,
-                 surfaces: Taps, plane: list[Float], spacing: list[Float],
-                 narrow: Sequence[Float] = ()) -> list[Float]:
+def smooth_level(rules: Sequence[PlaneRule], values: Taps[list[Float]], surfaces: Taps[SurfaceTap],
+                 plane: TangentPlane, spacing: Float,
+                 falloff: Float | None = None) -> list[Float]:
     """One level of S, and of Q. The last tap is the pixel itself.
 
     Args:
-        spreads: indices of what Q is of. narrowed: of what is smoothed no farther than shadows
-            are soft, if `narrow` says so. values: what Q and S are of.
-        surfaces: 1/z, far away where a pixel has no history, so that it does not count; ID.
-        plane: slope of 1/z by column and row, scale of a difference of 1/z.
-        spacing: pixels between taps. narrow: `narrowness`, or empty.
+        rules: of each plane in `values`. spacing: pixels between taps.
+        falloff: `penumbra.footprint_falloff`, for planes that are `within_penumbra`.
     """
-    exponent, near = surface_exponent(surfaces, plane, *spacing), narrowing(narrow, *spacing)
+    exponent, nearer = surface_exponent(surfaces, plane, spacing), footprint(falloff, spacing)
     h0 = BINOMIAL[0]**2
 
-    def each(factors: Sequence[Any], terms: Sequence[Any]) -> list[Any]:
-        """(factor, term) of each plane; factors: of the plane ones, and of those narrowed."""
-        kinds = [factors[c in narrowed] for c in range(len(terms))]
-        return [(dr.square(f) if c in spreads else f, t)
-                for c, (f, t) in enumerate(zip(kinds, terms))]
+    def each(wide: Any, within_penumbra: Any) -> list[Any]:
+        """The factor of each plane, of the plane ones and of those within the penumbra."""
+        factors = [within_penumbra if rule.within_penumbra else wide for rule in rules]
+        return [dr.square(f) if rule.squared else f for f, rule in zip(factors, rules)]
 
-    totals = [type(plane[0])(h0)] * 2
-    sums = [f * v for f, v in each((h0, h0), values.at(-1))]
+    totals = [type(plane.dx)(h0)] * 2
+    sums = [f * v for f, v in zip(each(h0, h0), values.at(-1), strict=True)]
     for i, offset in enumerate(window(1)):
         x = exponent(i, offset)
-        weights = exp2(x), exp2(near(x, offset))
-        sums = [dr.fma(w, v, s) for (w, v), s in zip(each(weights, values.at(i)), sums)]
+        weights = exp2(x), exp2(nearer(x, offset))
+        sums = [dr.fma(w, v, s) for w, v, s in zip(each(*weights), values.at(i), sums)]
         totals = [t + w for t, w in zip(totals, weights)]
         values.next()
-    return [f * s for f, s in each([1 / total for total in totals], sums)]
+    return [f * s for f, s in zip(each(*[1 / total for total in totals]), sums)]
 
 
-def narrowing(narrow: Sequence[Float], spacing: Float) -> Callable[[Float, Offset], Float]:
+def footprint(falloff: Float | None, spacing: Float) -> Callable[[Float, Offset], Float]:
     """Function of (x, offset): log2 x of a weight, less the more the farther a tap is.
 
-    narrow: `narrowness`, or empty, which takes nothing off.
+    falloff: `penumbra.footprint_falloff`, or None, which takes nothing off.
     """
-    limits = [x * dr.square(spacing) for x in narrow]
-
-    def limited(x: Float, offset: Offset) -> Float:
-        for limit in limits:
-            x = dr.fma(limit, -float(offset[0]**2 + offset[1]**2), x)
-        return x
-
-    return limited
+    if falloff is None:
+        return lambda x, _: x
+    rate = falloff * dr.square(spacing)
+    return lambda x, offset: dr.fma(rate, -float(offset[0]**2 + offset[1]**2), x)
 
 
-def surface_exponent(surfaces: Taps, plane: list[Float],
+def surface_exponent(surfaces: Taps[SurfaceTap], plane: TangentPlane,
                      spacing: Float) -> Callable[[int, Offset], Float]:
     """Function of (tap, offset): log2 of h times the weight of the distance from p's plane, and
     of being another object."""
-    gx, gy, scale = plane[0] * spacing, plane[1] * spacing, plane[2] * LOG2E
-    inverse_depth, id_ = surfaces.at(-1)
+    dx_, dy_, scale = plane.dx * spacing, plane.dy * spacing, plane.scale * LOG2E
+    center = surfaces.at(-1)
 
     def exponent(i: int, offset: Offset) -> Float:
         dy, dx = offset
-        tap_inverse_depth, tap_id = surfaces.at(i)
-        expected = dr.fma(gx, float(dx), dr.fma(gy, float(dy), inverse_depth))
+        tap = surfaces.at(i)
+        expected = dr.fma(dx_, float(dx), dr.fma(dy_, float(dy), center.inverse_depth))
         log2_h = math.log2(BINOMIAL[abs(dy)] * BINOMIAL[abs(dx)])
-        same = dr.select(tap_id == id_, type(scale)(log2_h), log2_h + math.log2(STRANGER))
-        return dr.fma(dr.abs(tap_inverse_depth - expected), -scale, same)
+        same = dr.select(tap.id == center.id, type(scale)(log2_h),
+                         log2_h + math.log2(OTHER_OBJECT_WEIGHT))
+        return dr.fma(dr.abs(tap.inverse_depth - expected), -scale, same)
 
     return exponent
 
 
-def merge(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], innovation: list[Float],
-          smooth: list[Float], energies: list[Float], carried: list[Float], other: list[Float],
-          guides: list[Float], numbers: list[Float]) -> tuple[list[Float], list[Float]]:
-    """The new history, a signal's planes and its s^2 each; and how the last filter fades out.
-
-    Args:
-        smooth: Q of the first and the last signal, S[e], and S of what is in `other`: how much
-            greater e^2 is, and e.
-        energies: W[l(e)^2]. carried, other: as from `look_back`.
-        guides: 1/z, its slopes (2) and scale, of all pixels. numbers: g, k, g', r,
-            frames until the filter has faded, and each signal's alpha.
-    """
-    length, *variances = carried
-    spread, last_spread, *smooth = smooth
-    if other:
-        *smooth, excess, wide_other = smooth
-        better = excess < 0
-        innovation = [*innovation[:-1], dr.select(better, other[0], innovation[-1])]
-        smooth[-1] = dr.select(better, wide_other, smooth[-1])
-        variances[-1] = dr.select(better, other[1], variances[-1])
-        energies = [*energies[:-1], dr.maximum(energies[-1] + dr.minimum(excess, 0), 0)]
-    least, doubt, sharp, renewal, frames, *alphas = numbers
-    new = length < 1.5
-    first = spatial_variances(stencil, sizes, signal, new, guides)
-    values, at = [], 0
-    for s, size in enumerate(sizes):
-        a = dr.maximum(1 / length, alphas[s])
-        e, wide = innovation[at:at + size], smooth[at:at + size]
-        follow = sharp
-        if s == 0:
-            follow = dr.maximum(_certainty(spread, wide[luma(size)], doubt), least)
-        elif size == 1:
-            certain = _certainty(last_spread, wide[luma(size)], doubt)
-            a, follow = dr.maximum(a, renewal * certain), dr.maximum(certain, sharp)
-        follow = dr.maximum(follow, a)
-        values += [dr.fma(follow - a, y, dr.fma(a - 1, x, d))
-                   for d, x, y in zip(signal[at:at + size], e, wide)]
-        noise = dr.select(new, first[s], dr.maximum(energies[s] - variances[s],
-                                                    energies[s] * LEAST_NOISE))
-        values.append(dr.fma(dr.square(1 - a), variances[s], dr.square(a) * noise))
-        at += size
-    return values, [_fade_out(length, frames)]
+def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], found: Innovations,
+          smoothed: Smoothed, plane: TangentPlane, gains: Gains) -> Merged:
+    """The new history, and how the last filter fades out with it."""
+    if found.shadow is not None:
+        found, smoothed = _choose_history(found, found.shadow, smoothed)
+    is_new = found.length < 1.5
+    spatial = spatial_variances(stencil, signals, is_new, plane)
+    merged = []
+    for s, (kind, signal) in enumerate(zip(layout.kinds, signals, strict=True)):
+        e, wide = found.signals[s], [smoothed.diffuse, *smoothed.sharp][s]
+        a, gain = dr.maximum(1 / found.length, gains.alphas[s]), gains.sharp_min_gain
+        if kind is SignalKind.DIFFUSE:
+            gain = dr.maximum(_certainty(smoothed.diffuse_spread, wide, gains), gains.min_gain)
+        elif kind is SignalKind.VISIBILITY:
+            assert smoothed.visibility_spread is not None
+            certain = _certainty(smoothed.visibility_spread, wide, gains)
+            a = dr.maximum(a, gains.change_alpha * certain)
+            gain = dr.maximum(certain, gains.sharp_min_gain)
+        gain = dr.maximum(gain, a)
+        merged_signal = mapped(_merged(gain, a), signal, e, wide)
+        energy, variance = smoothed.energies[s], found.variances[s]
+        noise = dr.select(is_new, spatial[s], dr.maximum(energy - variance, energy * MIN_NOISE))
+        merged.append(NoisySignal(merged_signal, dr.fma(dr.square(1 - a), variance,
+                                                        dr.square(a) * noise)))
+    return Merged(merged, fade_out(found.length, gains.fade_frames))
 
 
-def _certainty(spread: Float, wide: Float, doubt: Float) -> Float:
-    """1 - k Q / l(S[e])^2."""
-    return 1 - doubt * spread / dr.maximum(dr.square(wide), _LEAST)
+def _merged(gain: Float, a: Float) -> Callable[[Float, Float, Float], Float]:
+    """Function of (d, e, S[e])."""
+    return lambda d, e, wide: dr.fma(gain - a, wide, dr.fma(a - 1, e, d))
 
 
-def spatial_variances(stencil: Stencil, sizes: tuple[int, ...], signal: list[Float], wanted: Any,
-                      guides: list[Float]) -> list[Float]:
-    """Variance of each signal's luminance where `wanted`, from one frame.
+def _choose_history(found: Innovations, shadow: ShadowInnovation,
+                    smoothed: Smoothed) -> tuple[Innovations, Smoothed]:
+    """With the shadow history of visibility in the place of the other one, where it is better."""
+    excess, energy, shadow_wide = smoothed.excess, smoothed.energies[-1], smoothed.shadow_innovation
+    assert excess is not None
+    assert shadow_wide is not None
+    better = excess < 0
+    e, wide = found.signals[-1], smoothed.sharp[-1]
+    e = e._replace(luminance=dr.select(better, shadow.innovation, e.luminance))
+    wide = wide._replace(luminance=dr.select(better, shadow_wide, wide.luminance))
+    variance = dr.select(better, shadow.variance, found.variances[-1])
+    energy = dr.maximum(energy + dr.minimum(excess, 0), 0)
+    return (found._replace(signals=[*found.signals[:-1], e],
+                           variances=[*found.variances[:-1], variance]),
+            smoothed._replace(sharp=[*smoothed.sharp[:-1], wide],
+                              energies=[*smoothed.energies[:-1], energy]))
+
+
+def _certainty(spread: Float, wide: Signal, gains: Gains) -> Float:
+    """c = 1 - k Q / l(S[e])^2."""
+    return 1 - gains.noise_threshold * spread / dr.maximum(dr.square(wide.luminance), _MIN_ENERGY)
+
+
+def spatial_variances(stencil: Stencil, signals: list[Signal], active: Bool,
+                      plane: TangentPlane) -> list[Float]:
+    """Variance of each signal's luminance where `active`, from one frame.
 
     Mean square of what a 3x3 smoothing over the surface takes away, around the 3x3 pixels of the
     middle, over the share that it would take of white noise. An edge of light leaves less in it
     than in the variance of the window.
     """
-    starts = [sum(sizes[:s]) for s in range(len(sizes))]
-    lum = [signal[start + luma(size)] for start, size in zip(starts, sizes)]
-    inverse_depth, gx, gy, scale = guides
-    table = tabulate(stencil, [inverse_depth, *lum])
+    lum = [signal.luminance for signal in signals]
+    table = tabulate(stencil, [plane.inverse_depth, *lum])
     dr.eval(table)
     around = window_taps(stencil, RADIUS, table)
 
@@ -260,8 +314,8 @@ def spatial_variances(stencil: Stencil, sizes: tuple[int, ...], signal: list[Flo
         near, values = {}, {}
         for i, at in enumerate(product(range(-RADIUS, RADIUS + 1), repeat=2)):
             inside, dy, dx, (tap_inverse_depth, *luminances) = around(i)
-            expected = dr.fma(gx, dx, dr.fma(gy, dy, inverse_depth))
-            near[at] = inside & (dr.abs(tap_inverse_depth - expected) * scale < 1)
+            expected = dr.fma(plane.dx, dx, dr.fma(plane.dy, dy, plane.inverse_depth))
+            near[at] = inside & (dr.abs(tap_inverse_depth - expected) * plane.scale < 1)
             values[at] = luminances[:len(lum)]
         count, sums = stencil.Float(0), [stencil.Float(0)] * len(lum)
         for cy, cx in product(range(1 - RADIUS, RADIUS), repeat=2):
@@ -281,54 +335,60 @@ def spatial_variances(stencil: Stencil, sizes: tuple[int, ...], signal: list[Flo
         norm = 1 / dr.maximum(count, 1)
         return stencil.Float(1), [s * norm for s in sums]
 
-    _, variances = weighted_sums(stencil, wanted, 1, len(lum), mean_square)
-    return [dr.minimum(v, _MOST) for v in variances]
+    _, variances = weighted_sums(stencil, active, 1, len(lum), mean_square)
+    return [dr.minimum(v, _MAX_ENERGY) for v in variances]
 
 
-def guided_level(sizes: tuple[int, ...], fading: tuple[bool, ...], values: Taps,
-                 surfaces: Taps, plane: list[Float], spacing: list[Float], weaker: list[Float],
-                 sigmas: list[Float]) -> list[Float]:
-    """One level of the last filter over the signals of these sizes, each with its variance.
+class OutputFalloff(NamedTuple):
+    """What weakens the taps of the last filter: `fade_out` of its last level, and visibility's
+    `penumbra.footprint_falloff`, None without shadow rays."""
+
+    fade: Float
+    footprint: Float | None
+
+
+def output_level(layout: SignalLayout, level: int, values: Taps[list[NoisySignal]],
+                 surfaces: Taps[SurfaceTap], plane: TangentPlane, spacing: Float,
+                 falloff: OutputFalloff, sigmas: list[Float]) -> list[NoisySignal]:
+    """One level of the last filter. The last tap is the pixel itself.
 
     Args:
-        values: planes, a signal's and its variance each. fading: which signals' taps get weaker
-            by the first of `weaker`; the second, if any, is `narrowness` of visibility.
-            sigmas: sqrt(log2(e)) / sigma of each signal. Others as of `smooth_level`.
+        values: the signals that are left at this level.
+        sigmas: sqrt(log2(e)) / sigma of each signal. Others as of `smooth_level`.
     """
-    exponent = surface_exponent(surfaces, plane, *spacing)
-    center, h0 = values.at(-1), BINOMIAL[0]**2
-    starts = [sum(sizes[:s]) + s for s in range(len(sizes))]
-    sums = [v * h0 for v in center]
-    for start, size in zip(starts, sizes):
-        sums[start + size] = center[start + size] * h0**2
-    scales = [sigma / (dr.sqrt(center[start + size]) + EPSILON)
-              for start, size, sigma in zip(starts, sizes, sigmas)]
-    totals = [type(plane[0])(h0) for _ in sizes]
-    fade, *narrow = weaker
-    near = narrowing(narrow, *spacing)
+    exponent = surface_exponent(surfaces, plane, spacing)
+    nearer, h0 = footprint(falloff.footprint, spacing), BINOMIAL[0]**2
+    kinds, center = layout.output_level(level), values.at(-1)
+    sums = [NoisySignal(mapped(lambda v: v * h0, c.signal), c.variance * h0**2) for c in center]
+    scales = [sigma / (dr.sqrt(c.variance) + EPSILON) for c, sigma in zip(center, sigmas)]
+    totals = [type(plane.dx)(h0) for _ in kinds]
     for i, offset in enumerate(window(1)):
-        tap, e = values.at(i), exponent(i, offset)
-        for s, (start, size) in enumerate(zip(starts, sizes)):
-            at = start + luma(size)
-            distance = (tap[at] - center[at]) * scales[s]
-            x = dr.fma(distance, -distance, e)
-            if size == 1:
-                x = near(x, offset)
-            w = exp2(x + fade if fading[s] else x)
+        taps, surface_x = values.at(i), exponent(i, offset)
+        for s, (kind, tap) in enumerate(zip(kinds, taps, strict=True)):
+            distance = (tap.signal.luminance - center[s].signal.luminance) * scales[s]
+            x = dr.fma(distance, -distance, surface_x)
+            if kind is SignalKind.VISIBILITY:
+                x = nearer(x, offset)
+            w = exp2(x + falloff.fade if layout.is_last_level(kind, level) else x)
             totals[s] += w
-            for c in range(start, start + size):
-                sums[c] = dr.fma(w, tap[c], sums[c])
-            sums[start + size] = dr.fma(w * w, tap[start + size], sums[start + size])
+            sums[s] = NoisySignal(mapped(_weighted(w), tap.signal, sums[s].signal),
+                                  dr.fma(w * w, tap.variance, sums[s].variance))
         values.next()
-    for s, (start, size) in enumerate(zip(starts, sizes)):
-        norm = 1 / totals[s]
-        for c in range(start, start + size):
-            sums[c] *= norm
-        sums[start + size] *= dr.square(norm)
-    return sums
+    norms = [1 / total for total in totals]
+    return [NoisySignal(mapped(_times(norm), noisy.signal), noisy.variance * dr.square(norm))
+            for noisy, norm in zip(sums, norms)]
 
 
-def _fade_out(length: Float, frames: Float) -> Float:
+def _weighted(w: Float) -> Callable[[Float, Float], Float]:
+    """Function of (tap, sum)."""
+    return lambda tap, total: dr.fma(w, tap, total)
+
+
+def _times(factor: Float) -> Callable[[Float], Float]:
+    return lambda value: value * factor
+
+
+def fade_out(length: Float, frames: Float) -> Float:
     """log2 of 1 - (n - 1) / frames, which falls from 1 to 0."""
     left = 1 - (length - 1) / frames
     return dr.select(left > 1e-6, dr.log2(dr.maximum(left, 1e-6)), _NEVER)

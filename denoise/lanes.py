@@ -8,8 +8,9 @@ import numpy as np
 
 from render.frame import Frame
 
+from .arrays import Color
 from .debts import repay
-from .stencil import Float, Stencil
+from .stencil import Stencil
 from .surface import GUIDES, Surface, read_color, read_surface
 
 
@@ -45,7 +46,7 @@ class OnLanes:
         result, after = self.on_lanes(frame, color, surface, state)
         return repay(state.stencil.image(result), frame["id"]), after
 
-    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
-                 state: Any) -> tuple[list[Float], Any]:
+    def on_lanes(self, frame: Frame, color: Color, surface: Surface,
+                 state: Any) -> tuple[Color, Any]:
         """The same from arrays of lanes to arrays of lanes, in place of the frame's colour."""
         raise NotImplementedError

@@ -11,7 +11,8 @@ after another and its own state, which holds all that is remembered and all memo
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import warnings
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from types import MappingProxyType
 from typing import Any, Protocol
@@ -28,6 +29,7 @@ from .bilateral import Bilateral
 from .demodulation import CHANNELS as TEXTURE
 from .filtered_innovation import FilteredInnovation
 from .outliers import RemoveOutliers, WithoutOutliers
+from .parameters import renamed_parameters, with_present_names
 from .peers import PEERS
 from .separable import BilateralSeparable
 from .svgf import Svgf
@@ -42,7 +44,8 @@ class Method(Protocol):
 
     Attributes:
         needs: channels that a frame must have. A method may also have `uses`: channels that it
-            takes where a frame has them, beside albedo and emission.
+            takes where a frame has them, beside albedo and emission; and `renamed`: former name
+            of a parameter -> its name.
     """
 
     @property
@@ -71,11 +74,15 @@ METHODS: Mapping[str, type] = MappingProxyType({
 
 
 def build(name: str, settings: Mapping[str, str] | None = None,
-          outliers: float | None = None) -> Method:
+          outliers: float | None = None,
+          note: Callable[[str], None] | None = None) -> Method:
     """A method by name, with some parameters given as text: `build("bilateral", {"radius": "8"})`.
 
     The name is one of `METHODS` or `PEERS`. With `outliers`, frames have those removed first that
-    are farther off than so many deviations (`outliers.py`).
+    are farther off than so many standard deviations (`outliers.py`).
+
+    Args:
+        note: told of each parameter that is given by a former name; default a FutureWarning.
 
     Raises:
         InputError: no such method or parameter (the message lists them), or a value that does
@@ -88,7 +95,8 @@ def build(name: str, settings: Mapping[str, str] | None = None,
         method = WithoutOutliers(method, RemoveOutliers(outliers))
     known = parameters(method)
     typed = {}
-    for key, text in (settings or {}).items():
+    named = with_present_names(settings or {}, renamed_parameters(method), note or _warn)
+    for key, text in named.items():
         if key not in known:
             raise InputError(f"method '{name}' has no parameter '{key}': "
                              f"it has {', '.join(known)}")
@@ -126,6 +134,10 @@ def check_not_a_method(name: str, ran: str | None) -> None:
     if name != ran and plain in (*METHODS, *PEERS):
         raise InputError(f"'{name}' is the name of a method, and not of what makes these results "
                          f"({ran or 'another one'}): use another --name")
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, FutureWarning, stacklevel=4)
 
 
 def channels_read(method: Method, there: Iterable[str]) -> tuple[str, ...]:

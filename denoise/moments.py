@@ -3,13 +3,13 @@
 Symbols: h history length in frames; m1, m2 means of luminance and of its square over the history.
 A signal is (r, l, b), l its luminance, as in `atrous.py`.
 
-    h = min(h' + 1, longest), 1 without history
+    h = min(h' + 1, max_history_length), 1 without history
     C = C' + max(alpha, 1/h) (c - C'),  the same for m1, m2 with alpha_moments
     v = max(0, m2 - m1^2);  while h < 4, m1 and m2 are means over a 7x7 window with the geometry
         weights of `wavelet.py`, and v is multiplied by 4 / h.
 
 With a change of shading lambda in [0, 1] (A-SVGF), a = lambda + (1 - lambda) max(alpha, 1/h) is the
-weight of the current frame, and h = min(h' (1 - lambda)^10 + 1, longest).
+weight of the current frame, and h = min(h' (1 - lambda)^10 + 1, max_history_length).
 
 Sources: Schied et al. 2017, sections 4.2 and 4.3; the factor 4 / h is from NVIDIA's published pass.
 Schied et al. 2018; the power of 10 from Quake II RTX.
@@ -21,11 +21,13 @@ from typing import Any
 
 import drjit as dr
 
+from .arrays import Float
 from .exponential import exp2
 from .history import look_up
-from .reprojection import locate
+from .reprojection import Motion, locate
 from .sparse import weighted_sums, window_taps
-from .stencil import Float, Stencil
+from .stencil import Stencil
+from .surface import SurfaceSample
 from .wavelet import geometry_exponent
 
 FORGETTING = 10      # power of 1 - lambda that a length is multiplied by
@@ -34,32 +36,33 @@ RADIUS = 3           # pixels, of the window of the spatial estimate
 VALUES = 5           # a signal's in a record: r, l, b, m1, m2
 
 
-def accumulate(stencil: Stencil, fallback: bool, signal: list[Float], surface: list[Float],
-               table: list[Float], dual: list[Float], records: list[Float],
+def accumulate(stencil: Stencil, fallback: bool, signal: list[Float], surface: SurfaceSample,
+               motion: Motion, records: Float,
                changes: list[Float], alphas: list[Float],
                numbers: list[Float]) -> tuple[list[Float], list[Float], list[Float]]:
     """Blend with the history.
 
     Args:
-        signal: three arrays a signal. surface: ID, normal (3), depth.
-        table, dual: as for `reprojection.reproject`. records: `history.pack_records` of the
-            lengths and `VALUES` a signal.
+        signal: three arrays a signal. motion: of `reprojection.motion_between`.
+        records: `history.pack_records` of the lengths and `VALUES` a signal.
         changes: lambda of each signal, which then has a length of its own; or none.
-        alphas: of each signal. numbers: alpha_moments, longest, min_cosine, plane_tolerance.
+        alphas: of each signal. numbers: alpha_moments, max_history_length,
+            min_cosine, plane_tolerance.
     Returns:
         Colour (3 a signal), moments (2 a signal), lengths (1, or 1 a signal with `changes`).
     """
-    alpha_moments, longest, min_cosine, tolerance = numbers
+    alpha_moments, max_history_length, min_cosine, tolerance = numbers
     signals = [signal[i:i + 3] for i in range(0, len(signal), 3)]
-    place = locate(stencil, surface, table[0], dual, tolerance)
+    place = locate(stencil, surface, motion, tolerance)
     count = max(len(changes), 1)
-    old, found = look_up(stencil, place, records[0], count + VALUES * len(signals), min_cosine,
+    old, found = look_up(stencil, place, records, count + VALUES * len(signals), min_cosine,
                          fallback)
     colors, moments, lengths = [], [], []
     for s, (r, y, b) in enumerate(signals):
         if s < count:
             kept = (1 - changes[s])**FORGETTING if changes else 1
-            lengths.append(dr.select(found, dr.minimum(dr.fma(old[s], kept, 1), longest), 1))
+            length = dr.minimum(dr.fma(old[s], kept, 1), max_history_length)
+            lengths.append(dr.select(found, length, 1))
         fresh = 1 / lengths[-1]
         weights = [dr.maximum(alphas[s], fresh)] * 3 + [dr.maximum(alpha_moments, fresh)] * 2
         if changes:

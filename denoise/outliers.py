@@ -29,10 +29,12 @@ import numpy as np
 
 from render.frame import Frame
 
+from .arrays import Color, Float
 from .demodulation import Texture, read_texture
 from .luminance import luminance
 from .parameters import check_positive, check_whole
-from .stencil import Float, Offset, Planes, Stencil, Step, Taps, window
+from .stencil import Offset, Planes, Stencil, Step, Taps, window
+from .structure import evaluate
 from .surface import GUIDES, check_size, read_surface, repair
 
 FEWEST = 4
@@ -81,20 +83,20 @@ class RemoveOutliers:
         stencil = state.stencil
         check_size(frame, stencil)
         surface = read_surface(frame, stencil)
-        scale = dr.select(surface.exists, dr.abs(surface.plane_distance)
+        scale = dr.select(surface.is_valid, dr.abs(surface.plane_distance)
                           * stencil.opaque(1 / self.outlier_plane), 1)
-        guides = [stencil.Float(surface.id), surface.inverse_depth, *surface.plane, scale]
-        dr.eval(guides)
+        guides = [stencil.Float(surface.id), surface.inverse_depth, *surface.slope, scale]
+        evaluate(guides)
         state.guides.store(guides[:2])
         width = [stencil.opaque(self.outlier_width)]
         before = repair(np.asarray(frame["color"], np.float32), frame["id"])
         images, color = {}, before
         for name, given, texture in _lights(frame, before, stencil):
-            light = texture.remove(stencil.load(given))
-            dr.eval(light)
+            light = texture.demodulate(Color(*stencil.load(given)))
+            evaluate(light)
             state.signal.store(light)
             light = state.clamp(state.signal_taps, state.guide_taps, light, guides, width)
-            images[name] = stencil.image(texture.restore(light))
+            images[name] = stencil.image(texture.modulate(Color(*light)))
             color = color + (images[name] - given)
         if "specular" in images:
             images["indirect"] = images["indirect"] + images["specular"]
@@ -118,7 +120,7 @@ class OutlierState:
     guides: Planes
     signal_taps: Taps
     guide_taps: Taps
-    clamp: Step
+    clamp: Step[..., Any]
     before: float = 0.0
     after: float = 0.0
 
@@ -130,12 +132,12 @@ def _lights(frame: Frame, color: np.ndarray,
     if not all(name in frame for name in _PARTS[:2]):
         yield "color", color, texture
         return
-    plain = Texture(texture.albedo, [])
+    plain = Texture(texture.albedo)
     parts = {name: repair(np.asarray(frame[name], np.float32), frame["id"])
              for name in _PARTS if name in frame}
     yield "direct", parts["direct"], plain
     if "specular" in parts:
-        yield "specular", parts["specular"], Texture([], [])
+        yield "specular", parts["specular"], Texture()
         parts["indirect"] = parts["indirect"] - parts["specular"]
     yield "indirect", parts["indirect"], plain
 

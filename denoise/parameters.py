@@ -1,12 +1,67 @@
-"""Checks of denoiser parameters, and parameters given as text."""
+"""Checks of denoiser parameters, their former names, and parameters given as text."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields, is_dataclass
+from types import MappingProxyType
+from typing import Any, TypeVar
 
 from render.errors import InputError
+
+T = TypeVar("T")
+
+HISTORY_RENAMED: Mapping[str, str] = MappingProxyType({"longest": "max_history_length"})
+"""Of SVGF and A-SVGF: former name of a parameter -> its name. Former names are accepted, with a
+note, for one version."""
+
+INNOVATION_RENAMED: Mapping[str, str] = MappingProxyType({
+    "follow": "min_gain", "doubt": "noise_threshold", "sharp_follow": "sharp_min_gain",
+    "renewal": "change_alpha", "smoothing": "innovation_levels", "levels": "output_levels",
+    "sharp_smoothing": "sharp_innovation_levels", "sharp_levels": "sharp_output_levels",
+    "fade": "fade_frames", **HISTORY_RENAMED})
+"""The same of `onespp`."""
+
+
+def renamed_parameters(method: Any) -> dict[str, str]:
+    """Former name -> name of a method's parameters: `renamed` of its class and of its parts."""
+    found = dict(getattr(method, "renamed", {}))
+    for f in fields(method):
+        value = getattr(method, f.name)
+        if is_dataclass(value):
+            found.update(renamed_parameters(value))
+    return found
+
+
+def with_present_names(given: Mapping[str, T], renamed: Mapping[str, str],
+                       note: Callable[[str], None] = lambda text: None) -> dict[str, T]:
+    """Values by name, whatever name they were given by.
+
+    Args:
+        note: told of each former name.
+
+    Raises:
+        InputError: a value is given by both of its names.
+    """
+    found = {}
+    for key, value in given.items():
+        name = renamed.get(key, key)
+        if name in found:
+            former = next(old for old, new in renamed.items() if new == name)
+            raise InputError(f"{former} and {name} are one parameter: give {name} alone")
+        if name != key:
+            note(f"{key} is now {name}; the old name goes in the next version")
+        found[name] = value
+    return found
+
+
+def present_parameters(stored: Mapping[str, T]) -> dict[str, T]:
+    """All parameters of a method, as a file of this or of the last version has them, by name."""
+    for renamed in (INNOVATION_RENAMED, HISTORY_RENAMED):
+        if set(renamed) <= set(stored):
+            return with_present_names(stored, renamed)
+    return dict(stored)
 
 
 def check_positive(denoiser: Any, *names: str) -> None:

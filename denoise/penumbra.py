@@ -20,14 +20,15 @@ takes the extremes of d around a pixel, not a mean, and filters by this width al
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import NamedTuple
 
 import drjit as dr
 import numpy as np
 
 from render.frame import Frame
 
-from .stencil import Float, Stencil
+from .arrays import Bool, Float
+from .stencil import Stencil
 from .surface import camera_from_screen
 
 _SAMPLES = 2048   # pixels that sizes of lights are estimated from
@@ -36,8 +37,8 @@ _FARTHEST = 1e15  # of a point of a light that counts
 
 
 def light_sizes(frame: Frame) -> np.ndarray:
-    """(objects + 1,) float32: twice the deviation of the points of each object that shadow rays
-    asked for and, last, of the points of nobody's lights. Infinite for less than `_FEWEST`."""
+    """(objects + 1,) float32: twice the standard deviation of the points of each object that shadow
+    rays asked for and, last, of the environment's points. Infinite for less than `_FEWEST`."""
     count = len(frame.world_from_object) + 1
     step = max(1, round((frame.height * frame.width / _SAMPLES) ** 0.5))
     some = slice(step // 2, None, step)
@@ -60,25 +61,38 @@ def light_sizes(frame: Frame) -> np.ndarray:
     return np.where(number < _FEWEST, np.inf, size).astype(np.float32)
 
 
-def sharpness(stencil: Stencil, blocked: Float, share: Float, cosine: Float, light_id: Float,
-              depth: Float, focal: Float, sizes: Float) -> list[Float]:
-    """Whether each pixel's shadow ray was stopped, 1 or 0, and q where it was.
+class PenumbraSample(NamedTuple):
+    """Whether a pixel's shadow ray was stopped, 1 or 0, and q where it was; or means of these."""
+
+    blocked: Float
+    inverse_width: Float
+
+
+def penumbra_samples(stencil: Stencil, blocked: Bool, share: Float, cosine: Float, light_id: Float,
+                     depth: Float, focal: Float, sizes: Float) -> PenumbraSample:
+    """How sharp each pixel's shadow is.
 
     Args:
         blocked: of `shadow_motion.stopped`. share: d / D. cosine: between the ray and the normal.
         light_id: what the ray was sent to. focal: f. sizes: of `light_sizes`.
     """
-    nobody = float(dr.width(sizes) - 1)
+    environment = float(dr.width(sizes) - 1)
     size = dr.gather(stencil.Float, sizes, stencil.UInt(
-        dr.select(blocked, dr.select(light_id >= 0, light_id, nobody), 0)))
+        dr.select(blocked, dr.select(light_id >= 0, light_id, environment), 0)))
     left = dr.square((1 - share) * cosine)
     q = left / dr.maximum(dr.square(size * share * focal / depth) + left, 1e-20)
-    return [dr.select(blocked, stencil.Float(1), 0), dr.select(blocked & (q > 0), q, 0)]
+    return PenumbraSample(dr.select(blocked, stencil.Float(1), 0),
+                          dr.select(blocked & (q > 0), q, 0))
 
 
-def narrowness(around: Sequence[Float], scale: Float, fewest: float) -> Float:
+def footprint_falloff(around: PenumbraSample, scale: Float, min_share: float) -> Float:
     """log2(e) q / (2 p^2) of each pixel: what a tap's squared distance takes off the log2 of its
-    weight. around: `sharpness`, smoothed. scale: log2(e) / (2 p^2)."""
-    share, q = around
-    there = share > fewest
-    return dr.select(there, scale * q / dr.select(there, share, 1), 0)
+    weight.
+
+    Args:
+        around: `penumbra_samples`, smoothed. scale: log2(e) / (2 p^2).
+        min_share: of the rays around; where fewer were stopped, nothing is in the light's way.
+    """
+    shadowed = around.blocked > min_share
+    return dr.select(shadowed,
+                     scale * around.inverse_width / dr.select(shadowed, around.blocked, 1), 0)

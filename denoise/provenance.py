@@ -13,6 +13,7 @@ from render.manifest import Run
 from render.sequence import Sequence
 
 from .interleave import Times, read_times
+from .parameters import present_parameters
 from .scorecard import INPUT, Scores
 from .summary import text_of
 from .table import caption
@@ -47,7 +48,8 @@ def provenance(sequence: Sequence, scores: Scores, command: str = "") -> dict[st
         "machines": _machines(sequence, runs, read_times(sequence.folder)),
         "methods": [{"name": name, "device": run.device, "threads": run.threads,
                      "parameters": [*([("method", run.method)] if run.method != name else []),
-                                    *((k, str(v)) for k, v in run.parameters.items())],
+                                    *((k, str(v)) for k, v in
+                                      present_parameters(run.parameters).items())],
                      "versions": list(run.versions.items()),
                      "machine": run.machine} for name, run in runs.items()],
     }

@@ -23,9 +23,8 @@ Departure from the assignment: it takes the one nearest pixel and tests the obje
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import NamedTuple
 
 import drjit as dr
 import numpy as np
@@ -33,8 +32,17 @@ import numpy as np
 from render.errors import InputError
 from render.frame import Frame
 
-from .stencil import Float, Stencil
-from .surface import camera_from_screen, cross, dot, screen_from_camera, transform
+from .arrays import Bool, Color, Float, Matrix3, UInt, Vector3
+from .stencil import Stencil
+from .surface import (
+    SurfaceSample,
+    camera_from_screen,
+    cross,
+    dot,
+    opaque_matrix,
+    screen_from_camera,
+    transform,
+)
 
 LEAST_WEIGHT = 0.01
 WORDS = 8            # a pixel of packed history: colour 3, object ID, normal 3, depth
@@ -42,18 +50,31 @@ _ROW = 16            # floats an object in the motion table: E | S' t (3x4), row
 _FEWEST_OBJECTS = 64
 
 
-@dataclass(frozen=True)
-class Tests:
+class ReprojectionTests(NamedTuple):
     """What a pixel of the previous frame must pass.
 
     Attributes:
-        nearest: one tap, tested by object alone. min_cosine: of the angle between normals.
+        min_cosine: of the angle between normals.
         plane_tolerance: distance from the tangent plane over depth.
     """
 
-    nearest: bool
-    min_cosine: float
-    plane_tolerance: float
+    min_cosine: Float
+    plane_tolerance: Float
+
+
+class ScreenTransforms(NamedTuple):
+    """From a normal to its tangent plane on the screen, and back: B^T of the current frame and S'^T
+    of the previous one."""
+
+    plane_from_normal: Matrix3
+    normal_from_plane: Matrix3
+
+
+class Motion(NamedTuple):
+    """How surfaces moved between two frames: `motion_table` on the device, and transforms."""
+
+    table: Float
+    transforms: ScreenTransforms
 
 
 def motion_table(previous: Frame, current: Frame) -> np.ndarray:
@@ -106,9 +127,8 @@ def load_table(table: np.ndarray, stencil: Stencil) -> Float:
     return stencil.table(padded)
 
 
-def motion_between(previous: Frame, current: Frame,
-                   stencil: Stencil) -> tuple[Float, list[Float]]:
-    """What `locate` asks for: the motion table on the device; B^T and S'^T, nine numbers each.
+def motion_between(previous: Frame, current: Frame, stencil: Stencil) -> Motion:
+    """What `locate` asks for.
 
     Raises:
         InputError: the frames cannot follow one another, or their matrices do not project.
@@ -117,10 +137,9 @@ def motion_between(previous: Frame, current: Frame,
         raise InputError(
             f"frame {current.index} has {len(current.world_from_object)} objects, the frame "
             f"before it {len(previous.world_from_object)}: they are not of one sequence")
-    return (load_table(motion_table(previous, current), stencil),
-            [stencil.opaque(x) for matrix in (camera_from_screen(current),
-                                              screen_from_camera(previous))
-             for x in matrix.T.ravel()])
+    return Motion(load_table(motion_table(previous, current), stencil),
+                  ScreenTransforms(opaque_matrix(stencil, camera_from_screen(current).T),
+                                   opaque_matrix(stencil, screen_from_camera(previous).T)))
 
 
 def without_images(frame: Frame) -> Frame:
@@ -128,10 +147,15 @@ def without_images(frame: Frame) -> Frame:
     return replace(frame, images={"id": frame["id"]})
 
 
-def pack(stencil: Stencil, color: list[Float], surface: list[Float]) -> Float:
+def pack(stencil: Stencil, color: Color, surface: SurfaceSample) -> Float:
     """History of a frame: 8 words a lane, colour, ID, normal, depth."""
-    id_, nx, ny, nz, depth = surface
-    return stencil.pack([*color, stencil.Float(id_), nx, ny, nz, depth])
+    return stencil.pack([*color, stencil.Float(surface.id), *surface.normal, surface.depth])
+
+
+def _unpack(stencil: Stencil, history: Float, lane: UInt) -> tuple[Color, SurfaceSample]:
+    """A record of `pack`."""
+    red, green, blue, id_, nx, ny, nz, depth = stencil.unpack(history, lane, WORDS)
+    return Color(red, green, blue), SurfaceSample(id_, Vector3(nx, ny, nz), depth)
 
 
 @dataclass(frozen=True)
@@ -147,99 +171,111 @@ class Place:
 
     x: Float
     y: Float
-    inside: Any
+    inside: Bool
     id: Float
-    normal: list[Float]
-    rough: Any
-    plane: list[Float]
+    normal: Vector3
+    rough: Bool
+    plane: Vector3
     offset: Float
     nearness: Float
 
 
-def locate(stencil: Stencil, surface: list[Float], table: Float, dual: list[Float],
-           plane_tolerance: Float, shift: Sequence[Float] = (0, 0)) -> Place:
-    """Follow each surface back; surface: ID, normal (3), depth. Others as of `motion_between`.
+class ScreenShift(NamedTuple):
+    """Pixels on the screen, along a row and along a column."""
+
+    dx: Float
+    dy: Float
+
+
+def locate(stencil: Stencil, surface: SurfaceSample, motion: Motion, plane_tolerance: Float,
+           shift: ScreenShift | None = None) -> Place:
+    """Follow each surface back.
 
     Args:
-        shift: follow the point of the surface that many columns and rows away, at that depth.
+        motion: of `motion_between`.
+        shift: follow the point of the surface that far away on the screen, at that depth.
     """
-    float_t = stencil.Float
-    id_, *normal, depth = surface
+    float_t, table = stencil.Float, motion.table
+    id_, normal, depth = surface
     known = (id_ >= 0) & (id_ < dr.width(table) // _ROW)
     words = stencil.unpack(table, dr.select(known, id_, 0), _ROW, 12)
-    e, translation = [words[at:at + 3] for at in (0, 4, 8)], words[3::4]
+    e, translation = Matrix3(*[Vector3(*words[at:at + 3]) for at in (0, 4, 8)]), words[3::4]
     row, column = stencil.pixel()
-    u = [float_t(column) + 0.5 + shift[0], float_t(row) + 0.5 + shift[1], float_t(1)]
+    u = Vector3(float_t(column) + 0.5, float_t(row) + 0.5, float_t(1))
+    if shift is not None:
+        u = Vector3(u.x + shift.dx, u.y + shift.dy, u.z)
     inverse_depth = 1 / depth
     dx, dy, dw = (dr.fma(t, inverse_depth, dot(row, u)) for row, t in zip(e, translation))
     scale = 1 + dw
     shrink = 1 / scale
-    x, y = dr.fma(dx - u[0] * dw, shrink, u[0]), dr.fma(dy - u[1] * dw, shrink, u[1])
+    x, y = dr.fma(dx - u.x * dw, shrink, u.x), dr.fma(dy - u.y * dw, shrink, u.y)
     inside = (known & (scale > 1e-6) & (x >= 0) & (x < stencil.width)
               & (y >= 0) & (y < stencil.height))
     x, y = dr.select(inside, x, 0.5), dr.select(inside, y, 0.5)
-    expected, plane = _turned(e, normal, dual)
+    expected, plane = _turned(e, normal, motion.transforms)
     depth = depth * scale
     return Place(x, y, inside, float_t(id_), expected, dot(normal, normal) <= 0.25, plane,
-                 depth * dot(plane, [x, y, float_t(1)]), plane_tolerance * depth)
+                 depth * dot(plane, Vector3(x, y, float_t(1))), plane_tolerance * depth)
 
 
-def reproject(stencil: Stencil, surface: list[Float], table: Float, dual: list[Float],
-              history: Float, tests: Tests, limits: list[Float]) -> tuple[list[Float], Any]:
+class Reprojected(NamedTuple):
+    """Colour of the previous frame, and the mask of pixels that have a history."""
+
+    color: Color
+    is_valid: Bool
+
+
+def reproject(stencil: Stencil, surface: SurfaceSample, motion: Motion, history: Float,
+              tests: ReprojectionTests, nearest: bool = False) -> Reprojected:
     """Colour of the previous frame where each pixel's surface was.
 
     Args:
-        surface: ID, normal (3), depth of the current frame. table, dual: `motion_between`.
-        history: `pack` of the previous frame.
-        tests: `tests.nearest` alone is read; limits: min_cosine, plane_tolerance.
-    Returns:
-        three arrays, and the mask of pixels that have a history.
+        surface: of the current frame. motion: of `motion_between`.
+        history: `pack` of the previous frame. nearest: one tap, tested by object alone.
     """
-    at = locate(stencil, surface, table, dual, limits[1])
-
-    def tap(lane: Any) -> list[Float]:
-        return stencil.unpack(history, lane, WORDS)
-
-    if tests.nearest:
-        words = tap(stencil.UInt(at.y) * stencil.stride + stencil.UInt(at.x))
-        return words[:3], at.inside & (words[3] == at.id)
+    at = locate(stencil, surface, motion, tests.plane_tolerance)
+    if nearest:
+        color, there = _unpack(stencil, history,
+                               stencil.UInt(at.y) * stencil.stride + stencil.UInt(at.x))
+        return Reprojected(color, at.inside & (there.id == at.id))
 
     left, top = dr.floor(at.x - 0.5), dr.floor(at.y - 0.5)
     columns, x_weights = _pair(left, at.x - 0.5 - left, stencil.width)
     rows, y_weights = _pair(top, at.y - 0.5 - top, stencil.height)
-    at_corner = dot(at.plane, [left + 0.5, top + 0.5, stencil.Float(1)])
+    at_corner = dot(at.plane, Vector3(left + 0.5, top + 0.5, stencil.Float(1)))
     sums, total = [stencil.Float(0)] * 3, stencil.Float(0)
     for i in (0, 1):
         for j in (0, 1):
-            words = tap(stencil.UInt(rows[i]) * stencil.stride + stencil.UInt(columns[j]))
-            at_tap = at_corner + (at.plane[0] * j + at.plane[1] * i)
-            near = dr.abs(dr.fma(words[7], at_tap, -at.offset)) < at.nearness
-            turned = dot(at.normal, words[4:7]) > limits[0]
-            passes = (words[3] == at.id) & (at.rough | (near & turned))
+            color, there = _unpack(stencil, history, stencil.UInt(rows[i]) * stencil.stride
+                                   + stencil.UInt(columns[j]))
+            at_tap = at_corner + (at.plane.x * j + at.plane.y * i)
+            near = dr.abs(dr.fma(there.depth, at_tap, -at.offset)) < at.nearness
+            turned = dot(at.normal, there.normal) > tests.min_cosine
+            passes = (there.id == at.id) & (at.rough | (near & turned))
             weight = dr.select(passes, x_weights[j] * y_weights[i], 0)
-            sums = [dr.fma(weight, c, s) for c, s in zip(words, sums)]
+            sums = [dr.fma(weight, c, s) for c, s in zip(color, sums)]
             total += weight
     valid = at.inside & (total >= LEAST_WEIGHT)
     scale = 1 / dr.select(valid, total, 1)
-    return [s * scale for s in sums], valid
+    return Reprojected(Color(*[s * scale for s in sums]), valid)
 
 
-def _turned(e: list[list[Float]], normal: list[Float],
-            dual: list[Float]) -> tuple[list[Float], list[Float]]:
+def _turned(e: Matrix3, normal: Vector3,
+            transforms: ScreenTransforms) -> tuple[Vector3, Vector3]:
     """n', and B'^T n' with which n' . X' = z' (B'^T n') . u'.
 
     With F = I + E, a surface's B^T n turns by F^-T: its cofactors over its determinant, of which
     the sign matters alone.
     """
-    to_screen, to_camera = ([dual[i + at:i + at + 3] for at in (0, 3, 6)] for i in (0, 9))
-    f = [[row[c] + 1 if c == r else row[c] for c in range(3)] for r, row in enumerate(e)]
-    flat = transform(to_screen, normal)
-    cofactors = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])]
-    plane = [dr.mulsign(x, dot(f[0], cofactors[0])) for x in transform(cofactors, flat)]
-    turned = transform(to_camera, plane)
+    f = Matrix3(*[Vector3(*[row[c] + 1 if c == r else row[c] for c in range(3)])
+                  for r, row in enumerate(e)])
+    flat = transform(transforms.plane_from_normal, normal)
+    cofactors = Matrix3(cross(f.y, f.z), cross(f.z, f.x), cross(f.x, f.y))
+    plane = Vector3(*[dr.mulsign(x, dot(f.x, cofactors.x)) for x in transform(cofactors, flat)])
+    turned = transform(transforms.normal_from_plane, plane)
     length2 = dot(turned, turned)
     scale = dr.rsqrt(dr.select(length2 > 0, length2, 1))
-    return [x * scale for x in turned], [x * scale for x in plane]
+    return Vector3(*[x * scale for x in turned]), Vector3(*[x * scale for x in plane])
 
 
 def _pair(first: Float, fraction: Float, size: int) -> tuple[list[Float], list[Float]]:

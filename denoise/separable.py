@@ -20,14 +20,15 @@ that noise would have rejected, and fewer across an edge.
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import drjit as dr
+from typing import Any
 
 from render.frame import Frame
 
+from .arrays import Color
 from .bilateral import OUTSIDE, Bilateral, add_row_of_taps
 from .demodulation import read_texture
-from .stencil import Float, Planes, Stencil, Step, Taps
+from .stencil import Planes, Stencil, Step, Taps
+from .structure import evaluate
 from .surface import Surface
 
 
@@ -50,20 +51,20 @@ class BilateralSeparable(Bilateral):
         passes = [planes.taps([(0, dx) for dx in window]), planes.taps([(dy, 0) for dy in window])]
         return SeparableState(stencil, planes, passes, [Step(add_row_of_taps) for _ in passes])
 
-    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
-                 state: SeparableState) -> tuple[list[Float], SeparableState]:
+    def on_lanes(self, frame: Frame, color: Color, surface: Surface,
+                 state: SeparableState) -> tuple[Color, SeparableState]:
         stencil = state.stencil
         texture = read_texture(frame, stencil, self.demodulate)
-        center, weights = self.prepare(texture.remove(color), surface, state.planes)
+        center, weights = self.prepare(texture.demodulate(color), surface, state.planes)
         for taps, step in zip(state.passes, state.steps, strict=True):
             zeros = [stencil.constant(0) for _ in range(4)]
             *sums, total = step(taps, center, zeros, [*weights, stencil.opaque(0)])
             center = [s / total for s in sums] + center[3:]
             if taps is not state.passes[-1]:
-                dr.eval(center)
+                evaluate(center)
                 state.planes.store(center[:3])
         scale = stencil.opaque(1 / self.color_scale)
-        return texture.restore([c * scale for c in center[:3]]), state
+        return texture.modulate(Color(*[c * scale for c in center[:3]])), state
 
 
 @dataclass(frozen=True)
@@ -73,4 +74,4 @@ class SeparableState:
     stencil: Stencil
     planes: Planes
     passes: list[Taps]
-    steps: list[Step]
+    steps: list[Step[..., Any]]

@@ -21,8 +21,7 @@ instead of choosing between two.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import numpy as np
@@ -30,18 +29,33 @@ import numpy as np
 from render.channels import SHADOW
 from render.frame import Frame
 
+from .arrays import Bool, Float, Matrix3, Vector3
 from .history import look_up
-from .penumbra import light_sizes, sharpness
-from .reprojection import inverses, locate, world_motions
+from .penumbra import PenumbraSample, light_sizes, penumbra_samples
+from .reprojection import (
+    Motion,
+    ReprojectionTests,
+    ScreenShift,
+    inverses,
+    locate,
+    world_motions,
+)
 from .sparse import weighted_sums
-from .stencil import Float, Stencil
-from .surface import dot, screen_from_camera, transform
+from .stencil import Stencil
+from .surface import (
+    SurfaceSample,
+    TangentPlane,
+    dot,
+    opaque_matrix,
+    screen_from_camera,
+    transform,
+)
 
-AROUND = (2,)     # levels of the smoothing by which motion spreads
-CHOICE = 5        # levels of the smoothing of squared innovations
-SLOWEST = 0.05    # pixels a frame: a shadow that moves less stands still
-FEWEST = 1e-3     # share of the pixels around, below which nothing moves
-FASTEST = 0.25    # of the screen's width: what is quicker is no motion that history could follow
+SPREAD_LEVEL = 2  # of the smoothing by which motion spreads
+CHOICE_LEVELS = 5  # of the smoothing of squared innovations
+MIN_MOTION = 0.05  # pixels a frame: a shadow that moves less stands still
+MIN_SHARE = 1e-3  # of the pixels around, below which nothing moves
+MAX_MOTION = 0.25  # of the screen's width: history could not follow what is quicker
 _MATRIX = 16      # floats
 
 
@@ -56,127 +70,153 @@ def shadow_table(previous: Frame, current: Frame) -> np.ndarray:
     return np.stack([t, inverses(t)], 1).astype(np.float32).reshape(-1, 2, _MATRIX)
 
 
-@dataclass(frozen=True)
-class ShadowRays:
-    """What `shadow_motion` follows: arrays of lanes, traced and not yet evaluated, and tables.
+class ShadowRay(NamedTuple):
+    """One ray a pixel, traced and not yet evaluated.
 
     Attributes:
-        hits: light from the surface (3, world axes), its object ID, distance and ID of the blocker.
-        table: of `shadow_table`. sizes: of `penumbra.light_sizes`. matrices: camera_from_world and
-            screen_from_camera, 3x3 each, row by row; number of objects.
+        light: from the surface to the point of the light, world axes. light_id: its object ID.
+        blocker_distance, blocker_id: of what stopped the ray.
     """
 
-    hits: list[Float]
-    table: list[Float]
-    sizes: list[Float]
-    matrices: list[Float]
+    light: Vector3
+    light_id: Float
+    blocker_distance: Float
+    blocker_id: Float
+
+
+class ShadowRays(NamedTuple):
+    """What `follow_shadows` asks for.
+
+    Attributes:
+        ray: of each pixel. objects: their number.
+        table: of `shadow_table`. light_sizes: of `penumbra.light_sizes`.
+    """
+
+    ray: ShadowRay
+    table: Float
+    light_sizes: Float
+    camera_from_world: Matrix3
+    screen_from_camera: Matrix3
+    objects: Float
+
+
+class ShadowMotion(NamedTuple):
+    """Whether each pixel's shadow moves, 1 or 0, and u' - u where it does; or means of these."""
+
+    moves: Float
+    dx: Float
+    dy: Float
+
+
+class Shadows(NamedTuple):
+    """What shadow rays tell of each pixel, or means over the pixels around."""
+
+    motion: ShadowMotion
+    penumbra: PenumbraSample
+
+
+class ShadowHistory(NamedTuple):
+    """The history of visibility where a shadow was, and where a shadow moves and has one."""
+
+    visibility: Float
+    variance: Float
+    is_valid: Bool
 
 
 def read_shadow_rays(frame: Frame, previous: Frame, stencil: Stencil) -> ShadowRays:
     """The shadow rays of a frame; of the frame before, the matrices alone are read."""
-    hits = [plane for name in SHADOW
-            for plane in stencil.load(np.ascontiguousarray(frame[name], np.float32))]
-    matrices = [*frame.camera_from_world[:3, :3].ravel(), *screen_from_camera(frame).ravel(),
-                len(frame.world_from_object)]
-    return ShadowRays(hits, [stencil.table(shadow_table(previous, frame))],
-                      [stencil.table(light_sizes(frame))],
-                      [stencil.opaque(x) for x in matrices])
+    light, light_id, blocker_distance, blocker_id = (
+        stencil.load(np.ascontiguousarray(frame[name], np.float32)) for name in SHADOW)
+    return ShadowRays(ShadowRay(Vector3(*light), *light_id, *blocker_distance, *blocker_id),
+                      stencil.table(shadow_table(previous, frame)),
+                      stencil.table(light_sizes(frame)),
+                      opaque_matrix(stencil, frame.camera_from_world[:3, :3]),
+                      opaque_matrix(stencil, screen_from_camera(frame)),
+                      stencil.opaque(len(frame.world_from_object)))
 
 
-def shadow_motion(stencil: Stencil, hits: list[Float], surface: list[Float], position: list[Float],
-                  table: list[Float], matrices: list[Float]) -> list[Float]:
-    """Whether each pixel's shadow moves, 1 or 0, and u' - u where it does.
-
-    Args:
-        hits, table, matrices: of `ShadowRays`. surface: ID, normal (3), depth. position: X.
-    """
-    rows = [matrices[i:i + 3] for i in range(0, 18, 3)]
-    light_id, distance, blocker_id = hits[3:]
-    light = transform(rows[:3], hits[:3])
-    id_, *normal, depth = surface
-    objects = matrices[18]
-    blocked, scale = stopped(hits, id_, objects)
-    share = distance * scale
-    light_id = dr.select(light_id >= 0, light_id, objects)
+def shadow_motion(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
+                  position: Vector3) -> ShadowMotion:
+    """How each pixel's shadow moved; position: X."""
+    light = transform(rays.camera_from_world, rays.ray.light)
+    id_, normal, depth = surface
+    blocked, scale = stopped(rays, id_)
+    share = rays.ray.blocker_distance * scale
+    light_id = dr.select(rays.ray.light_id >= 0, rays.ray.light_id, rays.objects)
     row, column = stencil.pixel()
 
     def follow(_: Any) -> tuple[Float, list[Float]]:
         def matrix(object_: Float, inverse: int) -> list[Float]:
             row = 2 * stencil.UInt(dr.select(blocked, object_, 0)) + inverse
-            return stencil.unpack(table[0], row, _MATRIX)
+            return stencil.unpack(rays.table, row, _MATRIX)
 
         back = matrix(stencil.Float(id_), 1)
 
-        def seen(object_: Float, offset: list[Float]) -> list[Float]:
+        def seen(object_: Float, offset: Vector3) -> Vector3:
             """Where a point was as the surface saw it, from the surface."""
-            point = [p + o for p, o in zip(position, offset)]
+            point = Vector3(*[p + o for p, o in zip(position, offset)])
             there = _moved(back, _moved(matrix(object_, 0), point))
-            return [q - p for p, q in zip(position, there)]
+            return Vector3(*[q - p for p, q in zip(position, there)])
 
-        y, b = seen(light_id, light), seen(blocker_id, [share * o for o in light])
-        line = [p - q for p, q in zip(b, y)]
+        y = seen(light_id, light)
+        b = seen(rays.ray.blocker_id, Vector3(*[share * o for o in light]))
+        line = Vector3(*[p - q for p, q in zip(b, y)])
         rise = dot(normal, line)
         along = dot(normal, y) / dr.select(dr.abs(rise) > 0, rise, 1)
-        dx, dy, dz = transform(rows[3:], [dr.fma(-along, p, q) for p, q in zip(line, y)])
+        dx, dy, dz = transform(rays.screen_from_camera,
+                               Vector3(*[dr.fma(-along, p, q) for p, q in zip(line, y)]))
         nearness = 1 / (depth + dz)
         du = [dr.fma(-(stencil.Float(at) + 0.5), dz, d) * nearness
               for at, d in ((column, dx), (row, dy))]
         length = dr.abs(du[0]) + dr.abs(du[1])
-        moves = ((along < -1) & (length > SLOWEST) & (length < FASTEST * stencil.width)
+        moves = ((along < -1) & (length > MIN_MOTION) & (length < MAX_MOTION * stencil.width)
                  & (nearness > 0))  # false for NaN
         return dr.select(moves, stencil.Float(1), 0), [dr.select(moves, x, 0) for x in du]
 
-    moves, du = weighted_sums(stencil, blocked, 1, 2, follow)
-    return [moves, *du]
+    moves, (dx, dy) = weighted_sums(stencil, blocked, 1, 2, follow)
+    return ShadowMotion(moves, dx, dy)
 
 
-def follow_shadows(stencil: Stencil, hits: list[Float], surface: list[Float],
-                   position: list[Float], table: list[Float], sizes: list[Float],
-                   matrices: list[Float]) -> list[Float]:
-    """`shadow_motion` (3) and `penumbra.sharpness` (2) of each pixel; arguments as of those."""
-    id_, *normal, depth = surface
-    blocked, scale = stopped(hits, id_, matrices[18])
-    light = transform([matrices[i:i + 3] for i in (0, 3, 6)], hits[:3])
-    cosine = dr.abs(dot(normal, light)) * scale
-    focal = dr.abs(matrices[9])  # of screen_from_camera
-    return [*shadow_motion(stencil, hits, surface, position, table, matrices),
-            *sharpness(stencil, blocked, hits[4] * scale, cosine, hits[3], depth, focal, sizes[0])]
+def follow_shadows(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
+                   position: Vector3) -> Shadows:
+    """`shadow_motion` and `penumbra_samples` of each pixel; arguments as of the former."""
+    blocked, scale = stopped(rays, surface.id)
+    light = transform(rays.camera_from_world, rays.ray.light)
+    cosine = dr.abs(dot(surface.normal, light)) * scale
+    focal = dr.abs(rays.screen_from_camera.x.x)
+    return Shadows(shadow_motion(stencil, rays, surface, position),
+                   penumbra_samples(stencil, blocked, rays.ray.blocker_distance * scale, cosine,
+                                    rays.ray.light_id, surface.depth, focal, rays.light_sizes))
 
 
-def stopped(hits: list[Float], id_: Float, objects: Float) -> tuple[Any, Float]:
+def stopped(rays: ShadowRays, id_: Float) -> tuple[Bool, Float]:
     """Whether an object stopped each shadow ray, and 1 over the whole ray's length."""
-    light, (light_id, distance, blocker_id) = hits[:3], hits[3:]
+    (light, light_id, distance, blocker_id), objects = rays.ray, rays.objects
     length2 = dot(light, light)
     blocked = ((id_ >= 0) & (id_ < objects) & (distance > 0) & (length2 > 0) & (blocker_id >= 0)
                & (blocker_id < objects) & (light_id < objects))
     return blocked, dr.rsqrt(dr.select(blocked, length2, 1))
 
 
-def _moved(matrix: list[Float], point: list[Float]) -> list[Float]:
-    return [dr.fma(matrix[r], point[0], dr.fma(matrix[r + 1], point[1],
-            dr.fma(matrix[r + 2], point[2], matrix[r + 3]))) for r in (0, 4, 8)]
+def _moved(matrix: list[Float], point: Vector3) -> Vector3:
+    return Vector3(*[dr.fma(matrix[r], point.x, dr.fma(matrix[r + 1], point.y, dr.fma(
+        matrix[r + 2], point.z, matrix[r + 3]))) for r in (0, 4, 8)])
 
 
-def look_up_shadow(stencil: Stencil, surface: list[Float], guides: list[Float],
-                   motion: list[Float], dual: list[Float], records: Float, shadows: list[Float],
-                   tests: list[Float]) -> tuple[list[Float], Any]:
+def look_up_shadow(stencil: Stencil, surface: SurfaceSample, plane: TangentPlane, motion: Motion,
+                   records: Float, shadow: ShadowMotion, tests: ReprojectionTests) -> ShadowHistory:
     """The first two values of the records where each pixel's shadow was.
 
     Args:
-        surface: ID, normal (3), depth. guides: 1/z and its slopes (2). shadows: of
-            `shadow_motion`, smoothed. tests: min_cosine, plane_tolerance. The rest as of
-            `locate`.
-    Returns:
-        two arrays, and the mask of pixels whose shadow moves and has a history.
+        plane: of the surface. motion: of `motion_between`. shadow: of `shadow_motion`, smoothed.
     """
-    min_cosine, tolerance = tests
-    share = shadows[0]
-    moves = share > FEWEST
-    norm = 1 / dr.select(moves, share, 1)
-    shift = [dr.select(moves, x * norm, 0) for x in shadows[1:3]]
-    inverse_depth = dr.fma(guides[1], shift[0], dr.fma(guides[2], shift[1], guides[0]))
+    moves = shadow.moves > MIN_SHARE
+    norm = 1 / dr.select(moves, shadow.moves, 1)
+    shift = ScreenShift(*[dr.select(moves, x * norm, 0) for x in (shadow.dx, shadow.dy)])
+    inverse_depth = dr.fma(plane.dx, shift.dx, dr.fma(plane.dy, shift.dy, plane.inverse_depth))
     moves &= inverse_depth > 0
-    there = [*surface[:4], dr.select(moves, 1 / inverse_depth, surface[4])]
-    place = locate(stencil, there, motion[0], dual, tolerance, shift)
-    values, found = look_up(stencil, place, records, 2, min_cosine, wanted=moves)
-    return values, moves & found
+    there = surface._replace(depth=dr.select(moves, 1 / inverse_depth, surface.depth))
+    place = locate(stencil, there, motion, tests.plane_tolerance, shift)
+    (visibility, variance), is_valid = look_up(stencil, place, records, 2, tests.min_cosine,
+                                               active=moves)
+    return ShadowHistory(visibility, variance, moves & is_valid)

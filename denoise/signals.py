@@ -15,54 +15,78 @@ A frame that lacks the split has D in L; one without direct light, its colour.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
 
 import drjit as dr
 import numpy as np
 
-from render.errors import InputError
 from render.frame import Frame
 
+from .arrays import Color, Float
 from .atrous import with_green
 from .demodulation import Texture, read_texture
-from .stencil import Float, Stencil
+from .stencil import Stencil
+from .structure import arrays_of
 from .surface import luminance, repair
 
 USED = ("direct", "indirect", "unshadowed", "visibility", "specular")
 LARGEST_VISIBILITY = 2.0
 
 
+class SignalKind(Enum):
+    """What a signal is of: L, G and V."""
+
+    DIFFUSE = "diffuse"
+    GLOSSY = "glossy"
+    VISIBILITY = "visibility"
+
+
+class Signal(NamedTuple):
+    """A signal: of light, red, luminance and blue; of visibility, itself as `luminance` alone."""
+
+    red: Float | None
+    luminance: Float
+    blue: Float | None
+
+
 @dataclass(frozen=True)
 class Signals:
-    """Arrays of lanes.
+    """Arrays of lanes, traced and not yet evaluated.
 
     Attributes:
-        parts: planes of L, of G if `gloss`, three each (r, luminance, b), and of V, one, if
-            there is unshadowed light.
-        unshadowed: U (3), or empty. texture: albedo and emission. gloss: whether G is apart.
+        by_kind: L, then G and V where they are apart.
+        unshadowed: U, where V is apart. texture: albedo and emission.
     """
 
-    parts: list[list[Float]]
-    unshadowed: list[Float]
+    by_kind: dict[SignalKind, Signal]
+    unshadowed: Color | None
     texture: Texture
-    gloss: bool
 
     @property
-    def sizes(self) -> tuple[int, ...]:
-        """Planes of each signal."""
-        return tuple(map(len, self.parts))
+    def kinds(self) -> tuple[SignalKind, ...]:
+        return tuple(self.by_kind)
 
-    def color(self, parts: list[list[Float]]) -> list[Float]:
-        """The colour that (filtered) signals make, (r, g, b)."""
-        color = self.texture.restore(with_green(parts[0]))
-        if self.gloss:
-            color = [c + g for c, g in zip(color, with_green(parts[1]))]
+    @property
+    def listed(self) -> list[Signal]:
+        return list(self.by_kind.values())
+
+    def color(self, signals: Sequence[Signal]) -> Color:
+        """The colour that (filtered) signals make, in the order of `listed`."""
+        by_kind = dict(zip(self.by_kind, signals, strict=True))
+        color = self.texture.modulate(with_green(arrays_of(by_kind[SignalKind.DIFFUSE])))
+        if SignalKind.GLOSSY in by_kind:
+            glossy = with_green(arrays_of(by_kind[SignalKind.GLOSSY]))
+            color = Color(*[c + g for c, g in zip(color, glossy)])
         if self.unshadowed:
-            color = [dr.fma(parts[-1][0], u, c) for u, c in zip(self.unshadowed, color)]
+            visibility = by_kind[SignalKind.VISIBILITY].luminance
+            color = Color(*[dr.fma(visibility, u, c) for u, c in zip(self.unshadowed, color)])
         return color
 
 
-def read_signals(frame: Frame, color: list[Float], stencil: Stencil, demodulate: bool,
+def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
                  gloss: bool) -> Signals:
     """The signals of a frame; `color` is used where it has no direct and indirect light.
 
@@ -72,7 +96,7 @@ def read_signals(frame: Frame, color: list[Float], stencil: Stencil, demodulate:
     """
     texture = read_texture(frame, stencil, demodulate)
     if "direct" not in frame or "indirect" not in frame:
-        return Signals([_with_luminance(texture.remove(color))], [], texture, False)
+        return Signals({SignalKind.DIFFUSE: _of_light(texture.demodulate(color))}, None, texture)
 
     def load(name: str) -> list[Float]:
         image = np.asarray(frame[name], np.float32)
@@ -80,31 +104,23 @@ def read_signals(frame: Frame, color: list[Float], stencil: Stencil, demodulate:
         return stencil.load(repair(image, frame["id"]))
 
     if "emission" in frame and not texture.emission:
-        texture = Texture(texture.albedo, load("emission"), texture.black)
-    light = [d + i for d, i in zip(load("direct"), load("indirect"))]
-    parts: list[list[Float]] = []
-    unshadowed: list[Float] = []
-    gloss = gloss and "specular" in frame
-    if gloss:
-        specular = load("specular")
-        light = [c - g for c, g in zip(light, specular)]
-        parts.append(_with_luminance(specular))
+        texture = Texture(texture.albedo, Color(*load("emission")), texture.black)
+    light = Color(*[d + i for d, i in zip(load("direct"), load("indirect"))])
+    apart: dict[SignalKind, Signal] = {}
+    unshadowed = None
+    if gloss and "specular" in frame:
+        specular = Color(*load("specular"))
+        light = Color(*[c - g for c, g in zip(light, specular)])
+        apart[SignalKind.GLOSSY] = _of_light(specular)
     if "unshadowed" in frame and "visibility" in frame:
-        unshadowed = load("unshadowed")
+        unshadowed = Color(*load("unshadowed"))
         (v,) = load("visibility")
         v = dr.select(v < LARGEST_VISIBILITY, v, LARGEST_VISIBILITY)
-        light = [dr.fma(-v, u, c) for u, c in zip(unshadowed, light)]
-        parts.append([v])
-    light = Texture(texture.albedo, []).remove(light)
-    return Signals([_with_luminance(light), *parts], unshadowed, texture, gloss)
+        light = Color(*[dr.fma(-v, u, c) for u, c in zip(unshadowed, light)])
+        apart[SignalKind.VISIBILITY] = Signal(None, v, None)
+    diffuse = _of_light(Texture(texture.albedo).demodulate(light))
+    return Signals({SignalKind.DIFFUSE: diffuse, **apart}, unshadowed, texture)
 
 
-def check_signals(frame: Frame, before: tuple, now: tuple) -> None:
-    """InputError where a frame has other signals than the one before it."""
-    if before != now:
-        raise InputError(f"frame {frame.index} has other channels than the frame before it: "
-                         "render the sequence anew with one set of --channels")
-
-
-def _with_luminance(light: list[Float]) -> list[Float]:
-    return [light[0], luminance(light), light[2]]
+def _of_light(light: Color) -> Signal:
+    return Signal(light.red, luminance(light), light.blue)

@@ -1,29 +1,30 @@
 """Weighted sums over taps that few pixels need.
 
-A loop that the other lanes do not enter: a packet of lanes of which none is wanted skips it. Its
+A loop that the other lanes do not enter: a packet of lanes of which none is active skips it. Its
 taps are gathers, since a shifted view would be read by every lane.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 
-from .stencil import Float, Stencil
+from .arrays import Bool, Float
+from .stencil import Stencil
 
 WORDS = 8  # floats a lane in the table of a window: what one gather brings
 
 _while_loop: Any = dr.while_loop  # its type hints know loops of one variable only
 
 
-def weighted_sums(stencil: Stencil, wanted: Any, taps: int, count: int,
+def weighted_sums(stencil: Stencil, active: Bool, taps: int, count: int,
                   tap: Callable[[Any], tuple[Float, list[Float]]]) -> tuple[Float, list[Float]]:
     """Sum of the weights, and of `count` weighted values, over taps 0 to `taps` - 1.
 
     Args:
-        wanted: mask; elsewhere all sums are 0.
+        active: mask; elsewhere all sums are 0.
         tap: index of a tap (an Int array) to its weight and values.
     """
     def body(i: Any, total: Float, sums: list[Float]) -> tuple:
@@ -32,7 +33,7 @@ def weighted_sums(stencil: Stencil, wanted: Any, taps: int, count: int,
 
     zeros = [dr.zeros(stencil.Float, stencil.lanes) for _ in range(count + 1)]
     _, total, sums = _while_loop(
-        (dr.select(wanted, stencil.Int(0), taps), zeros[0], zeros[1:]),
+        (dr.select(active, stencil.Int(0), taps), zeros[0], zeros[1:]),
         lambda i, total, sums: i < taps, body, labels=("tap", "total", "sums"))
     return total, sums
 
@@ -42,22 +43,27 @@ def tabulate(stencil: Stencil, words: Sequence[Float]) -> Float:
     return stencil.pack([*words, *[stencil.Float(0)] * (WORDS - len(words))])
 
 
-def window_taps(stencil: Stencil, radius: int,
-                table: Float) -> Callable[[Any], tuple[Any, Float, Float, list[Float]]]:
-    """Function of a tap's index in the window of (2 radius + 1)^2 pixels, the pixel included.
+class WindowTap(NamedTuple):
+    """Whether a tap is inside the image, its offset, pixels, and its words in the table."""
 
-    It returns whether the tap is inside the image, its offset (dy, dx), and its words in the table.
-    """
+    inside: Bool
+    dy: Float
+    dx: Float
+    words: list[Float]
+
+
+def window_taps(stencil: Stencil, radius: int, table: Float) -> Callable[[Any], WindowTap]:
+    """Function of a tap's index in the window of (2 radius + 1)^2 pixels, the pixel included."""
     row, column = (stencil.Int(i) for i in stencil.pixel())
     side = 2 * radius + 1
 
-    def tap(i: Any) -> tuple[Any, Float, Float, list[Float]]:
+    def tap(i: Any) -> WindowTap:
         dy = i // side
         dy, dx = dy - radius, i - side * dy - radius
         y, x = row + dy, column + dx
         inside = (y >= 0) & (y < stencil.height) & (x >= 0) & (x < stencil.width)
         lane = stencil.UInt(dr.select(inside, y * stencil.stride + x, 0))
-        return (inside, stencil.Float(dy), stencil.Float(dx),
-                stencil.unpack(table, lane, WORDS))
+        return WindowTap(inside, stencil.Float(dy), stencil.Float(dx),
+                         stencil.unpack(table, lane, WORDS))
 
     return tap

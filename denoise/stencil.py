@@ -10,7 +10,8 @@ A kernel here runs over the *lanes* of a grid: the h rows of an image, each foll
   of 16 lanes costs as much as 15 such loads. On CUDA, where neighbouring gathers coalesce, it is a
   gather with an offset that the kernel takes as an argument. The `gather` layout also runs on
   the CPU, where the tests compare it with the views. It has not been run on a GPU.
-- A **step** is a traced function that is recorded once and replayed (`dr.freeze`).
+- A **step** is a traced function that is recorded once and replayed (`dr.freeze`). It takes and
+  returns named structures of arrays (`structure.py`).
 
 A kernel's results are fresh arrays, one number a lane. `Planes.store` copies them into planes: a
 scatter would cost five times as much, and in a frozen function it silently writes to a copy.
@@ -23,7 +24,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import ModuleType
-from typing import Any
+from typing import Any, Generic, ParamSpec, TypeVar, cast
 
 import drjit as dr
 import numpy as np
@@ -31,7 +32,13 @@ import numpy as np
 from render import backend
 from render.errors import InputError
 
-Float = Any  # a one-dimensional array of drjit.llvm or drjit.cuda, known at run time
+from .arrays import Float
+from .structure import Form, arrays_of, build, flatten
+
+P = ParamSpec("P")
+R = TypeVar("R")
+T = TypeVar("T")
+Named = TypeVar("Named")
 Offset = tuple[int, int]
 
 _TAIL = 64  # floats after the last lane that a vector load may touch
@@ -160,7 +167,7 @@ class Stencil:
             words += list(dr.gather(self.ArrayXf, packed, at, shape=(_GATHERED, self.lanes)))
         return words[:count]
 
-    def rows_around(self, arrays: Sequence[Float], margin: int) -> Taps:
+    def rows_around(self, arrays: Sequence[Float], margin: int) -> Taps[list[Float]]:
         """A kernel's results, evaluated over `margin` rows more on either side, seen from the
         2 margin + 1 rows around each pixel: taps without a copy."""
         starts = [row * self.stride for row in range(2 * margin + 1)]
@@ -168,12 +175,13 @@ class Stencil:
             return self.gathers(arrays, starts, self.lanes)
         memory = [array.numpy() for array in arrays]
         return Taps([[self.Float(m[start:start + self.lanes]) for m in memory] for start in starts],
-                    [], [], self.lanes, self.backend)
+                    [], [], self.lanes, self.backend, _listed)
 
-    def gathers(self, arrays: Sequence[Float], starts: Sequence[int], lanes: int) -> Taps:
+    def gathers(self, arrays: Sequence[Float], starts: Sequence[int],
+                lanes: int) -> Taps[list[Float]]:
         """Taps of the `gather` layout: arrays from each start on."""
         return Taps([], list(arrays), [dr.opaque(self.UInt, start) for start in starts], lanes,
-                    self.backend)
+                    self.backend, _listed)
 
     def constant(self, value: float) -> Float:
         """An array of lanes that holds one number."""
@@ -215,14 +223,15 @@ class Planes:
             else:
                 self._arrays.append(dr.opaque(stencil.Float, float(value), stencil.size))
 
-    def store(self, arrays: Sequence[Float], first: int = 0, gutters: bool = False) -> None:
+    def store(self, values: Any, first: int = 0, gutters: bool = False) -> None:
         """Copy evaluated arrays of lanes into planes from `first` on.
 
         Args:
+            values: a structure of arrays (`structure.py`), depth first.
             gutters: copy those too, a quarter quicker: where another plane, which keeps its own,
                 takes their weight away, so that they need only be finite.
         """
-        s = self.stencil
+        s, arrays = self.stencil, arrays_of(values)
         if s.layout == "gather":
             lane = dr.arange(s.UInt, s.lanes)
             inside = True if gutters else lane % s.stride < s.width
@@ -237,7 +246,7 @@ class Planes:
                 np.copyto(s.rows(target), s.rows(array.numpy()))
 
     def taps(self, offsets: Sequence[Offset], channels: Sequence[int] | None = None,
-             margin: int = 0) -> Taps:
+             margin: int = 0) -> Taps[list[Float]]:
         """Planes (default: all) seen from the neighbours at offsets (dy, dx).
 
         Args:
@@ -252,7 +261,7 @@ class Planes:
         if s.layout == "gather":
             return s.gathers([self._arrays[c] for c in channels], starts, lanes)
         return Taps([[self._view(c, start, lanes) for c in channels] for start in starts], [], [],
-                    lanes, s.backend)
+                    lanes, s.backend, _listed)
 
     def _view(self, channel: int, start: int, lanes: int) -> Float:
         """The same offset gives the same variable, so that a frozen function sees the alias."""
@@ -280,14 +289,20 @@ def _allocate(size: int, value: float, index: int, shift: int) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Taps:
-    """Planes at a few offsets: `taps.at(t)` lists the planes as seen from the t-th neighbour."""
+class Taps(Generic[T]):
+    """Planes at a few offsets: `taps.at(t)` is the planes as seen from the t-th neighbour, a list
+    unless they were `named`."""
 
     views: list[list[Float]]
     planes: list[Float]
     starts: list[Any]
     lanes: int
     backend: dr.JitBackend
+    make: Callable[..., T]
+
+    def named(self, make: Callable[..., Named]) -> Taps[Named]:
+        """The same taps, of which `at` gives make(*planes), such as a NamedTuple."""
+        return Taps(self.views, self.planes, self.starts, self.lanes, self.backend, make)
 
     def __len__(self) -> int:
         return len(self.views) or len(self.starts)
@@ -297,7 +312,7 @@ class Taps:
         """All arrays that a kernel must be given."""
         return self.views or [self.planes, self.starts]
 
-    def seen_as(self, arrays: list[list[Float]]) -> Taps:
+    def seen_as(self, arrays: list[list[Float]]) -> Taps[T]:
         """The same taps of arrays that stand for these."""
         if self.views:
             return replace(self, views=arrays)
@@ -311,39 +326,56 @@ class Taps:
         """
         dr.detail.new_scope(self.backend)
 
-    def at(self, t: int) -> list[Float]:
+    def at(self, t: int) -> T:
         if self.views:
-            return self.views[t]
+            return self.make(*self.views[t])
         lane = dr.arange(type(self.starts[t]), self.lanes) + self.starts[t]
-        return [dr.gather(type(plane), plane, lane) for plane in self.planes]
+        return self.make(*[dr.gather(type(plane), plane, lane) for plane in self.planes])
 
 
-class Step:
-    """A function of Dr.Jit arrays and taps, recorded at its first call and replayed after that.
+def _listed(*planes: Float) -> list[Float]:
+    return list(planes)
+
+
+class Step(Generic[P, R]):
+    """A function of structures of Dr.Jit arrays and taps, recorded at its first call and replayed
+    after that.
+
+    An argument is a `structure` (`structure.py`): an array, None, taps, or a NamedTuple, tuple or
+    list of such; so is the result, but without taps. Another form, such as None where there was an
+    array, or other numbers of lanes, record again.
 
     Make one for each grid and each place it is called from: a recording holds the size of the
-    grid, and which of its arguments share memory. Other numbers of lanes record again.
+    grid, and which of its arguments share memory.
+
+    Raises:
+        TypeError: at a call, where an argument holds something else. A number that a kernel takes
+            is an array too (`Stencil.opaque`): otherwise it would be recorded. Of a result,
+            Dr.Jit makes it the cause of its RuntimeError.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        call = _Call()
+    def __init__(self, function: Callable[P, R]) -> None:
+        call, traced = _Call(), cast("Callable[..., R]", function)
 
-        def record(*arrays: Any) -> Any:
-            return function(*(a.seen_as(b) if isinstance(a, Taps) else b
-                              for a, b in zip(call.arguments, arrays)))
+        def record(arrays: list[Any], taps: list[list[Any]]) -> list[Any]:
+            seen = [a.seen_as(b) for a, b in zip(call.taps, taps, strict=True)]
+            arguments = build(call.form, arrays, seen)
+            results = flatten(traced(*arguments))
+            call.results[call.form] = results.form
+            return results.arrays
 
         self._call = call
-        self._frozen = dr.freeze(record, state_fn=lambda *_: _sizes(*call.arguments),
-                                 warn_after=1000)
+        self._frozen = dr.freeze(record, state_fn=lambda *_: call.form, warn_after=1000)
 
-    def __call__(self, *arguments: Any) -> Any:
-        self._call.arguments = arguments
+    def __call__(self, *arguments: P.args, **_: P.kwargs) -> R:
+        call = self._call
+        call.form, arrays, call.taps = flatten(arguments)
         try:
             with _no_collection():
-                # Dr.Jit walks lists twice as fast as it walks dataclasses.
-                return self._frozen(*(a.arrays if isinstance(a, Taps) else a for a in arguments))
+                results = self._frozen(arrays, [taps.arrays for taps in call.taps])
         finally:
-            self._call.arguments = ()
+            call.taps = []
+        return build(call.results[call.form], results)
 
     @property
     def recordings(self) -> int:
@@ -351,10 +383,14 @@ class Step:
 
 
 class _Call:
-    """The arguments of the call that is being made. Dr.Jit walks all that a recorded function's
-    closure holds, at every call, but not into an object such as this."""
+    """The call that is being made: its taps and form; and the form of the results by the form of
+    the arguments. Dr.Jit walks all that a recorded function's closure holds, at every call, but not
+    into an object such as this."""
 
-    arguments: tuple[Any, ...] = ()
+    def __init__(self) -> None:
+        self.taps: list[Taps] = []
+        self.form: Form = ()
+        self.results: dict[Form, Form] = {}
 
 
 @contextmanager
@@ -368,8 +404,3 @@ def _no_collection() -> Iterator[None]:
     finally:
         if enabled:
             gc.enable()
-
-
-def _sizes(*arguments: Any) -> tuple[int, ...]:
-    return tuple(a.lanes if isinstance(a, Taps) else dr.width(a[0]) for a in arguments
-                 if isinstance(a, Taps) or (isinstance(a, list) and a))

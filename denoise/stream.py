@@ -35,6 +35,7 @@ from .methods import (
     parameters,
 )
 from .outliers import energy_kept
+from .parameters import present_parameters
 from .timing import timed
 
 ALONE = 8  # frames that nothing else runs beside
@@ -172,7 +173,7 @@ def _remove_stale(sequence: Sequence, name: str, run: Run) -> None:
     """Drop results that this run would otherwise be mixed with: others', and a killed run's."""
     if name in sequence.methods():
         old = sequence.read_run(name)
-        if all(getattr(old, key) == getattr(run, key)
-               for key in ("method", "parameters", "versions")):
+        if ((old.method, present_parameters(old.parameters), old.versions)
+                == (run.method, run.parameters, run.versions)):
             return
     sequence.remove_results(name)

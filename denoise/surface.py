@@ -13,7 +13,9 @@ has a direction; where one of these is missing or not finite it counts as backgr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import drjit as dr
 import numpy as np
@@ -21,11 +23,41 @@ import numpy as np
 from render.errors import InputError
 from render.frame import Frame
 
-from .stencil import Float, Stencil
+from .arrays import Bool, Color, Float, Matrix3, Vector3
+from .stencil import Stencil
 
 GUIDES = ("normal", "depth", "id")
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 _FARTHEST = 1e15  # a greater depth counts as background: its square would overflow
+
+
+class SurfaceSample(NamedTuple):
+    """What a pixel of another frame must agree with: object ID, -1 for none; n; z."""
+
+    id: Float
+    normal: Vector3
+    depth: Float
+
+
+class InverseDepthSlope(NamedTuple):
+    """Change of the tangent plane's 1/z a column and a row."""
+
+    dx: Float
+    dy: Float
+
+
+class TangentPlane(NamedTuple):
+    """1/z of a surface's tangent plane on the screen, and how far from it a pixel may lie.
+
+    Attributes:
+        inverse_depth: 1/z at the pixel. dx, dy: its change a column and a row.
+        scale: of a difference of 1/z, to the distance from the plane in tolerated ones.
+    """
+
+    inverse_depth: Float
+    dx: Float
+    dy: Float
+    scale: Float
 
 
 @dataclass(frozen=True)
@@ -33,21 +65,24 @@ class Surface:
     """Arrays of lanes, traced and not yet evaluated.
 
     Attributes:
-        exists: mask, whether there is a surface.
-        normal: n, three arrays. position: X, three arrays. depth: z. id: object ID, -1 for none.
-        inverse_depth: 1 / z, 0 where nothing exists.
-        plane: 1 / z of the tangent plane changes by plane[0] a column and plane[1] a row.
+        is_valid: mask, whether there is a surface.
+        normal: n. position: X. depth: z. id: object ID, -1 for none.
+        inverse_depth: 1 / z, 0 where there is no surface. slope: of the tangent plane's 1 / z.
         plane_distance: n . X, the (negative) distance of the camera from the tangent plane.
     """
 
-    exists: Float
-    normal: list[Float]
-    position: list[Float]
+    is_valid: Bool
+    normal: Vector3
+    position: Vector3
     depth: Float
     id: Float
     inverse_depth: Float
-    plane: tuple[Float, Float]
+    slope: InverseDepthSlope
     plane_distance: Float
+
+    @property
+    def sample(self) -> SurfaceSample:
+        return SurfaceSample(self.id, self.normal, self.depth)
 
 
 def camera_from_screen(frame: Frame) -> np.ndarray:
@@ -84,22 +119,24 @@ def read_surface(frame: Frame, stencil: Stencil) -> Surface:
     check_size(frame, stencil)
     (id_,) = stencil.load(np.ascontiguousarray(frame["id"], np.int32))
     (depth,) = stencil.load(np.asarray(frame["depth"], np.float32))
-    world_normal = stencil.load(np.asarray(frame["normal"], np.float32))
-    normal = transform(_opaque(stencil, frame.camera_from_world[:3, :3]), world_normal)
+    world_normal = Vector3(*stencil.load(np.asarray(frame["normal"], np.float32)))
+    normal = transform(opaque_matrix(stencil, frame.camera_from_world[:3, :3]), world_normal)
     length2 = dot(normal, normal)
-    exists = (id_ >= 0) & (depth > 0) & (depth < _FARTHEST) & (length2 > 0.01) & (length2 < 100)
-    scale = dr.rsqrt(dr.select(exists, length2, 1))
-    normal = [dr.select(exists, n * scale, 0) for n in normal]
-    depth = dr.select(exists, depth, 1)
-    b = _opaque(stencil, camera_from_screen(frame))
+    is_valid = (id_ >= 0) & (depth > 0) & (depth < _FARTHEST) & (length2 > 0.01) & (length2 < 100)
+    scale = dr.rsqrt(dr.select(is_valid, length2, 1))
+    normal = Vector3(*[dr.select(is_valid, n * scale, 0) for n in normal])
+    depth = dr.select(is_valid, depth, 1)
+    b = opaque_matrix(stencil, camera_from_screen(frame))
     row, column = stencil.pixel()
-    ray = transform(b, [stencil.Float(column) + 0.5, stencil.Float(row) + 0.5, stencil.Float(1)])
-    position = [dr.select(exists, depth * r, 0) for r in ray]
+    ray = transform(b, Vector3(stencil.Float(column) + 0.5, stencil.Float(row) + 0.5,
+                               stencil.Float(1)))
+    position = Vector3(*[dr.select(is_valid, depth * r, 0) for r in ray])
     distance = dot(normal, position)
     safe = dr.select(dr.abs(distance) > 1e-3 * depth, distance, -1e-3 * depth)  # grazing: not 0
-    plane = [dr.select(exists, dot(normal, [b[r][c] for r in range(3)]) / safe, 0) for c in (0, 1)]
-    return Surface(exists, normal, position, depth, dr.select(exists, id_, -1),
-                   dr.select(exists, 1 / depth, 0), (plane[0], plane[1]), safe)
+    dx, dy, _ = (dr.select(is_valid, dot(normal, Vector3(*column)) / safe, 0)
+                 for column in zip(*b))
+    return Surface(is_valid, normal, position, depth, dr.select(is_valid, id_, -1),
+                   dr.select(is_valid, 1 / depth, 0), InverseDepthSlope(dx, dy), safe)
 
 
 def check_size(frame: Frame, stencil: Stencil) -> None:
@@ -108,10 +145,10 @@ def check_size(frame: Frame, stencil: Stencil) -> None:
                          f"state was made for {stencil.width}x{stencil.height}: make a new one")
 
 
-def read_color(frame: Frame, stencil: Stencil) -> list[Float]:
-    """The frame's colour as three arrays of lanes, repaired (see `repair`)."""
+def read_color(frame: Frame, stencil: Stencil) -> Color:
+    """The frame's colour, repaired (see `repair`)."""
     check_size(frame, stencil)
-    return stencil.load(repair(np.asarray(frame["color"], np.float32), frame["id"]))
+    return Color(*stencil.load(repair(np.asarray(frame["color"], np.float32), frame["id"])))
 
 
 LARGEST = 1e18       # radiance beyond this is taken for a bad pixel: its square would overflow
@@ -156,23 +193,24 @@ def _sums_around(color: np.ndarray, good: np.ndarray, id_: np.ndarray, y: np.nda
     return total, count
 
 
-def dot(a: list[Float], b: list[Float]) -> Float:
-    return dr.fma(a[0], b[0], dr.fma(a[1], b[1], a[2] * b[2]))
+def dot(a: Vector3, b: Vector3) -> Float:
+    return dr.fma(a.x, b.x, dr.fma(a.y, b.y, a.z * b.z))
 
 
-def cross(a: list[Float], b: list[Float]) -> list[Float]:
-    return [dr.fma(a[i], b[j], -(a[j] * b[i])) for i, j in ((1, 2), (2, 0), (0, 1))]
+def cross(a: Vector3, b: Vector3) -> Vector3:
+    return Vector3(*[dr.fma(a[i], b[j], -(a[j] * b[i])) for i, j in ((1, 2), (2, 0), (0, 1))])
 
 
-def transform(matrix: list[list[Float]], vector: list[Float]) -> list[Float]:
-    return [dot(row, vector) for row in matrix]
+def transform(matrix: Matrix3, vector: Vector3) -> Vector3:
+    return Vector3(*[dot(row, vector) for row in matrix])
 
 
-def _opaque(stencil: Stencil, matrix: np.ndarray) -> list[list[Float]]:
-    return [[stencil.opaque(x) for x in row] for row in matrix]
+def opaque_matrix(stencil: Stencil, matrix: np.ndarray) -> Matrix3:
+    """A (3, 3) matrix that a kernel takes as an argument."""
+    return Matrix3(*[Vector3(*[stencil.opaque(x) for x in row]) for row in matrix])
 
 
-def luminance(color: list[Float]) -> Float:
+def luminance(color: Sequence[Float]) -> Float:
     """Relative luminance of linear Rec. 709 radiance."""
     red, green, blue = LUMINANCE
     return dr.fma(color[0], red, dr.fma(color[1], green, color[2] * blue))

@@ -6,8 +6,8 @@ by it removes what noise is left (`wavelet.py`). The first level's output is the
 history.
 
 Source: Schied et al. 2017, "Spatiotemporal variance-guided filtering: real-time reconstruction for
-path-traced global illumination", doi:10.1145/3105762.3105770. Defaults are its constants; `longest`
-is 32 in NVIDIA's pass.
+path-traced global illumination", doi:10.1145/3105762.3105770. Defaults are its constants;
+`max_history_length` is 32 in NVIDIA's pass.
 
 Departures, beside those that the three modules list:
 - A frame without direct and indirect light (an import) is one signal, its colour.
@@ -16,24 +16,26 @@ Departures, beside those that the three modules list:
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-import drjit as dr
 import numpy as np
 
 from render.frame import Frame
 
+from .arrays import Color, Float
 from .atrous import EPSILON, LARGEST_LEVELS, LOG2E, luminance_scale, with_green
 from .demodulation import Texture, read_texture
 from .history import RecordState, no_history, pack_records
 from .lanes import OnLanes
 from .moments import SHORT, accumulate, estimate_variances
-from .parameters import check_positive, check_range, check_whole
-from .reprojection import motion_between, without_images
+from .parameters import HISTORY_RENAMED, check_positive, check_range, check_whole
+from .reprojection import Motion, motion_between, without_images
 from .sparse import tabulate
-from .stencil import Float, Planes, Stencil, Step, Taps, window
-from .surface import Surface, luminance, repair
+from .stencil import Planes, Stencil, Step, Taps, window
+from .structure import evaluate
+from .surface import Surface, SurfaceSample, luminance, repair
 from .wavelet import OUTSIDE, filter_level, read_guides
 
 SIGNALS = ("direct", "indirect")
@@ -48,7 +50,7 @@ class Svgf(OnLanes):
     Attributes:
         alpha: least weight of the current frame in colour [1, 1e-6 to 1].
         alpha_moments: least weight of the current frame in moments of luminance [1, 1e-6 to 1].
-        longest: cap of the history length [frames, 1 to 1e6].
+        max_history_length: cap of the history length [frames, 1 to 1e6].
         levels: wavelet levels; taps of the last are 2^(levels - 1) pixels apart [1, 1 to 8].
         sigma_luminance: falloff with difference of luminance [standard deviations, above 0].
         sigma_depth: falloff with depth relative to its screen-space slope [1, above 0].
@@ -74,7 +76,7 @@ class Svgf(OnLanes):
 
     alpha: float = 0.2
     alpha_moments: float = 0.2
-    longest: float = 32.0
+    max_history_length: float = 32.0
     levels: int = 5
     sigma_luminance: float = 4.0
     sigma_depth: float = 1.0
@@ -89,12 +91,13 @@ class Svgf(OnLanes):
     feedback: bool = True
 
     uses: ClassVar[tuple[str, ...]] = SIGNALS
+    renamed: ClassVar[Mapping[str, str]] = HISTORY_RENAMED
 
     def __post_init__(self) -> None:
         check_whole(self, "levels", LARGEST_LEVELS)
         for name in ("alpha", "alpha_moments"):
             check_range(self, name, 1e-6, 1.0)
-        check_range(self, "longest", 1.0, 1e6)
+        check_range(self, "max_history_length", 1.0, 1e6)
         check_range(self, "min_cosine", -1.0, 1.0)
         check_positive(self, "sigma_luminance", "sigma_depth", "normal_power", "plane_tolerance")
 
@@ -105,101 +108,110 @@ class Svgf(OnLanes):
     def init_on(self, stencil: Stencil) -> RecordState:
         return RecordState(stencil, no_history(stencil))
 
-    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
-                 state: Any) -> tuple[list[Float], Any]:
+    def on_lanes(self, frame: Frame, color: Color, surface: Surface,
+                 state: Any) -> tuple[Color, Any]:
         """`color` is used where the frame is one signal."""
         lights, texture = self.read_lights(frame, color, state.stencil)
         filtered, state = self.filter_lights(frame, lights, surface, state, [])
-        return texture.restore([sum(c[1:], c[0]) for c in zip(*filtered)]), state
+        return texture.modulate(added_up(filtered)), state
 
-    def read_lights(self, frame: Frame, color: list[Float],
-                    stencil: Stencil) -> tuple[list[list[Float]], Texture]:
+    def read_lights(self, frame: Frame, color: Color,
+                    stencil: Stencil) -> tuple[list[Color], Texture]:
         """The signals, (r, g, b) each, and what was taken out of their sum."""
         texture = read_texture(frame, stencil, self.demodulate)
         if not self.split or not all(name in frame for name in SIGNALS):
-            return [texture.remove(color)], texture
+            return [texture.demodulate(color)], texture
         direct, indirect, emission = (
-            stencil.load(repair(np.asarray(frame[name], np.float32), frame["id"]))
-            if name in frame else [] for name in (*SIGNALS, "emission"))
-        plain = Texture(texture.albedo, [])
-        return ([plain.remove(light) for light in (direct, indirect)],
+            Color(*stencil.load(repair(np.asarray(frame[name], np.float32), frame["id"])))
+            if name in frame else None for name in (*SIGNALS, "emission"))
+        plain = Texture(texture.albedo)
+        return ([plain.demodulate(light) for light in (direct, indirect) if light],
                 Texture(texture.albedo, emission))
 
     def alphas(self, count: int) -> list[float]:
         """alpha of each signal."""
         return [self.alpha] * count
 
-    def filter_lights(self, frame: Frame, lights: list[list[Float]], surface: Surface,
-                      state: Any, changes: list[Float]) -> tuple[list[list[Float]], Any]:
+    def filter_lights(self, frame: Frame, lights: Sequence[Color], surface: Surface,
+                      state: Any, changes: list[Float]) -> tuple[list[Color], Any]:
         """Each signal (r, g, b) filtered, and the state for the next frame.
 
         changes: lambda of each signal (see `moments.py`), or none.
         """
         stencil = state.stencil
-        table, dual = motion_between(state.previous or frame, frame, stencil)
-        works = state.works
-        if works is None or len(works.filters) != len(lights):
-            works = Works.make(self, stencil, len(lights))
+        motion = motion_between(state.previous or frame, frame, stencil)
+        passes = state.passes
+        if passes is None or len(passes.filters) != len(lights):
+            passes = Passes.make(self, stencil, len(lights))
         signal = [c for r, g, b in lights for c in (r, luminance([r, g, b]), b)]
-        near = [surface.id, *surface.normal, surface.depth]
+        near = surface.sample
         guides = read_guides(stencil, surface, self.sigma_depth)
-        dr.eval(signal, near, guides)
-        works.guides.store(guides[:4])
-        numbers = [stencil.opaque(x) for x in (self.alpha_moments, self.longest, self.min_cosine,
-                                               self.plane_tolerance)]
-        colors, moments, lengths, window = works.accumulate(
-            signal, near, [table], dual, [state.records], guides, changes,
+        evaluate(signal, near, guides)
+        passes.guides.store(guides[:4])
+        numbers = [stencil.opaque(x) for x in (self.alpha_moments, self.max_history_length,
+                                               self.min_cosine, self.plane_tolerance)]
+        colors, moments, lengths, window = passes.accumulate(
+            signal, near, motion, state.records, guides, changes,
             [stencil.opaque(a) for a in self.alphas(len(lights))], numbers)
         half_power = stencil.opaque(LOG2E * self.normal_power / 2)
-        enough = stencil.opaque(SHORT if self.temporal_variance else 2 * self.longest + 1)
-        variances = works.estimate(moments, lengths, guides, [window], [half_power, enough])
+        enough = stencil.opaque(SHORT if self.temporal_variance
+                                else 2 * self.max_history_length + 1)
+        variances = passes.estimate(moments, lengths, guides, [window], [half_power, enough])
         numbers = [stencil.opaque(EPSILON), stencil.opaque(self.sigma_luminance / LOG2E),
                    half_power]
         lights, kept = [], []
-        for s, part in enumerate(works.filters):
+        for s, part in enumerate(passes.filters):
             given = [*colors[3 * s:3 * s + 3], variances[s]]
             first, last = part.apply(given, guides, numbers)
             lights.append(with_green(last))
             kept += (first if self.feedback else given)[:3]
         records = state.records
         if self.accumulate:
-            records = works.pack(near, kept, moments, lengths)
-        return lights, replace(state, works=works, records=records,
+            records = passes.pack(near, kept, moments, lengths)
+        return lights, replace(state, passes=passes, records=records,
                                previous=without_images(frame))
 
 
+def added_up(lights: Sequence[Color]) -> Color:
+    """The sum of signals, (r, g, b) each."""
+    total = lights[0]
+    for light in lights[1:]:
+        total = Color(*[a + b for a, b in zip(total, light)])
+    return total
+
+
 @dataclass(frozen=True)
-class Works:
+class Passes:
     """Planes of the guides (n, z), the recorded steps, and a filter for each signal."""
 
     guides: Planes
-    accumulate: Step
-    estimate: Step
+    accumulate: Step[..., Any]
+    estimate: Step[..., Any]
     filters: list[Levels]
-    pack: Step
+    pack: Step[..., Any]
 
     @staticmethod
-    def make(method: Svgf, stencil: Stencil, count: int) -> Works:
+    def make(method: Svgf, stencil: Stencil, count: int) -> Passes:
         guides = stencil.planes(OUTSIDE)
 
-        def blend(signal: list[Float], near: list[Float], table: list[Float], dual: list[Float],
-                  records: list[Float], guides: list[Float], *rest: list[Float]) -> Any:
-            colors, moments, lengths = accumulate(stencil, method.fallback, signal, near, table,
-                                                  dual, records, *rest)
+        def blend(signal: list[Float], surface: SurfaceSample, motion: Motion,
+                  records: Float, guides: list[Float], *rest: list[Float]) -> Any:
+            colors, moments, lengths = accumulate(stencil, method.fallback, signal, surface,
+                                                  motion, records, *rest)
             window = tabulate(stencil, [*moments, *guides[:4]])
-            dr.eval(colors, moments, lengths, window)
+            evaluate(colors, moments, lengths, window)
             return colors, moments, lengths, window
 
         def estimate(*arguments: Any) -> list[Float]:
             return estimate_variances(stencil, *arguments)
 
-        def pack(near: list[Float], colors: list[Float], moments: list[Float],
+        def pack(surface: SurfaceSample, colors: list[Float], moments: list[Float],
                  lengths: list[Float]) -> Float:
             values = [c for s in range(count)
                       for c in (*colors[3 * s:3 * s + 3], *moments[2 * s:2 * s + 2])]
-            return pack_records(stencil, near, [*lengths, *values])
+            return pack_records(stencil, surface, [*lengths, *values])
 
-        return Works(guides, Step(blend), Step(estimate),
+        return Passes(guides, Step(blend), Step(estimate),
                      [Levels.make(stencil, guides, method.levels) for _ in range(count)],
                      Step(pack))
 
@@ -212,8 +224,8 @@ class Levels:
     blur_taps: Taps
     level_taps: list[tuple[Taps, Taps]]
     spacings: list[Float]
-    scale_steps: list[Step]
-    level_steps: list[Step]
+    scale_steps: list[Step[..., Any]]
+    level_steps: list[Step[..., Any]]
 
     @staticmethod
     def make(stencil: Stencil, guides: Planes, levels: int) -> Levels:

@@ -23,11 +23,20 @@ import drjit as dr
 
 from render.frame import Frame
 
+from .arrays import Color, Float
 from .lanes import OnLanes
 from .parameters import check_positive, check_range, check_whole
-from .reprojection import Tests, motion_between, pack, reproject, without_images
-from .stencil import Float, Stencil, Step, Taps
-from .surface import Surface
+from .reprojection import (
+    Motion,
+    ReprojectionTests,
+    motion_between,
+    pack,
+    reproject,
+    without_images,
+)
+from .stencil import Stencil, Step, Taps
+from .structure import evaluate
+from .surface import Surface, SurfaceSample
 from .window_moments import RowMoments, window_moments
 
 
@@ -71,28 +80,27 @@ class Temporal(OnLanes):
         return self.clamp_radius
 
     def init_on(self, stencil: Stencil) -> TemporalState:
-        tests = Tests(self.nearest, self.min_cosine, self.plane_tolerance)
-
-        def blend(rows: Taps, *arguments: Any) -> tuple[list[Float], Float]:
-            return clamp_and_blend(stencil, tests, rows, *arguments)
+        def blend(rows: Taps, *arguments: Any) -> tuple[Color, Float]:
+            return clamp_and_blend(stencil, self.nearest, rows, *arguments)
 
         return TemporalState(stencil, RowMoments.make(stencil, self.clamp_radius), Step(blend))
 
-    def on_lanes(self, frame: Frame, color: list[Float], surface: Surface,
-                 state: TemporalState) -> tuple[list[Float], TemporalState]:
+    def on_lanes(self, frame: Frame, color: Color, surface: Surface,
+                 state: TemporalState) -> tuple[Color, TemporalState]:
         stencil, previous = state.stencil, state.previous
-        guides = [surface.id, *surface.normal, surface.depth]
-        dr.eval(color, guides)
+        sample = surface.sample
+        evaluate(color, sample)
         if previous is None:
-            history = pack(stencil, color, guides)
-            dr.eval(history)
+            history = pack(stencil, color, sample)
+            evaluate(history)
             return color, state.after(frame, history)
         moments = state.row_moments(color)
-        table, dual = motion_between(previous, frame, stencil)  # while rows are being summed
-        numbers = [stencil.opaque(x) for x in (self.alpha, self.color_box, self.min_cosine,
-                                               self.plane_tolerance)]
+        motion = motion_between(previous, frame, stencil)  # while rows are being summed
+        numbers = [stencil.opaque(x) for x in (self.alpha, self.color_box)]
+        tests = ReprojectionTests(stencil.opaque(self.min_cosine),
+                                  stencil.opaque(self.plane_tolerance))
         rows = stencil.rows_around(moments, self.clamp_radius)
-        result, history = state.blend(rows, color, guides, [table], dual, [state.history],
+        result, history = state.blend(rows, color, sample, motion, state.history, tests,
                                       numbers)
         return result, state.after(frame, history)
 
@@ -103,21 +111,21 @@ class TemporalState:
 
     stencil: Stencil
     row_moments: RowMoments
-    blend: Step
+    blend: Step[..., Any]
     previous: Frame | None = None
-    history: Float = field(default=None, repr=False)
+    history: Float | None = field(default=None, repr=False)
 
     def after(self, frame: Frame, history: Float) -> TemporalState:
         """The state for the frame after `frame`; of that one only the matrices are kept."""
         return replace(self, previous=without_images(frame), history=history)
 
 
-def clamp_and_blend(stencil: Stencil, tests: Tests, rows: Taps, color: list[Float],
-                    guides: list[Float], table: list[Float], dual: list[Float],
-                    history: list[Float], numbers: list[Float]) -> tuple[list[Float], Float]:
+def clamp_and_blend(stencil: Stencil, nearest: bool, rows: Taps, color: Color,
+                    surface: SurfaceSample, motion: Motion, history: Float,
+                    tests: ReprojectionTests, numbers: list[Float]) -> tuple[Color, Float]:
     """Blend with the clamped history; rows: of `window_moments`."""
-    alpha, k, *limits = numbers
-    old, valid = reproject(stencil, guides, table[0], dual, history[0], tests, limits)
+    alpha, k = numbers
+    old, valid = reproject(stencil, surface, motion, history, tests, nearest)
     rows.next()
     mean, sigma = window_moments(stencil, rows)
     result = []
@@ -125,6 +133,7 @@ def clamp_and_blend(stencil: Stencil, tests: Tests, rows: Taps, color: list[Floa
         low, high = dr.fma(-k, sigma[c], mean[c]), dr.fma(k, sigma[c], mean[c])
         clamped = dr.select(old[c] < low, low, dr.select(old[c] > high, high, old[c]))
         result.append(dr.select(valid, dr.fma(alpha, color[c] - clamped, clamped), color[c]))
-    packed = pack(stencil, result, guides)
-    dr.eval(result, packed)
-    return result, packed
+    blended = Color(*result)
+    packed = pack(stencil, blended, surface)
+    evaluate(blended, packed)
+    return blended, packed

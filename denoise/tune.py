@@ -25,6 +25,7 @@ from render.sequence import Sequence
 from .means import mean_decibels
 from .methods import Method, build, channels_read, parameters
 from .metrics import psnr
+from .parameters import present_parameters
 from .tonemap import srgb_from_linear
 
 FACTORS = (2.0, 1.4, 1.15)
@@ -128,15 +129,18 @@ class Search:
         return self.tried[key]
 
 
-def starting_point(name: str, given: Mapping[str, str]) -> Settings:
-    """Defaults of a method and what is given instead; InputError as from `build`."""
-    return {k: v for k, v in parameters(build(name, given)).items() if not isinstance(v, str)}
+def starting_point(name: str, given: Mapping[str, str],
+                   note: Callable[[str], None] | None = None) -> Settings:
+    """Defaults of a method and what is given instead; `note` and InputError as of `build`."""
+    start = parameters(build(name, given, note=note))
+    return {k: v for k, v in start.items() if not isinstance(v, str)}
 
 
 def _read(file: Path) -> dict[str, float]:
     try:
         tried = json.loads(file.read_text())
-        return {str(key): float(value) for key, value in tried.items()}
+        return {json.dumps(present_parameters(json.loads(key)), sort_keys=True): float(value)
+                for key, value in tried.items()}
     except (OSError, ValueError, AttributeError, TypeError) as error:
         raise InputError(f"{file} does not hold an earlier search ({error}): "
                          "remove it, or give another --out") from error

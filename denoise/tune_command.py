@@ -9,9 +9,9 @@ import click
 from render.command import device_option, threads_option, use
 from render.errors import InputError
 from render.sequence import Sequence
-from render.terminal import progress
+from render.terminal import note, progress
 
-from .parameters import pairs
+from .parameters import pairs, renamed_parameters, with_present_names
 from .tonemap import TONE_MAP
 
 
@@ -37,7 +37,9 @@ def tune(folders: tuple[Path, ...], method: str, names: tuple[str, ...],
     from .methods import build
     from .tune import FACTORS, Search, read_case, starting_point
 
-    start = starting_point(method, pairs(settings))
+    start = starting_point(method, pairs(settings), note)
+    renamed = renamed_parameters(build(method))
+    names = tuple(with_present_names(dict.fromkeys(names), renamed, note))
     unknown = [name for name in names if name not in start]
     if unknown:
         raise InputError(f"method '{method}' has no parameter '{unknown[0]}': "

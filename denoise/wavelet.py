@@ -33,11 +33,11 @@ OUTSIDE = [0.0, 0.0, 0.0, 1e26]  # n, z outside the image
 
 def read_guides(stencil: Stencil, surface: Surface, sigma_depth: float) -> list[Float]:
     """n (3), z, and what scales |dz|: sigma_depth / log2(e) times grad z (2), and eps_z z."""
-    float_t, exists = stencil.Float, surface.exists
+    float_t, exists = stencil.Float, surface.is_valid
     normal = [dr.select(exists, n, m) for n, m in zip(surface.normal, (1, 0, 0))]
     depth = dr.select(exists, surface.depth, float_t(_BACKGROUND))
     scale = -stencil.opaque(sigma_depth / LOG2E) * dr.square(surface.depth)
-    slope = [dr.select(exists, scale * g, 0) for g in surface.plane]
+    slope = [dr.select(exists, scale * g, 0) for g in surface.slope]
     return [*normal, depth, *slope, depth * (EPSILON_DEPTH / LOG2E)]
 
 

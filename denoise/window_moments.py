@@ -14,7 +14,9 @@ from typing import Any
 
 import drjit as dr
 
-from .stencil import Float, Planes, Stencil, Step, Taps
+from .arrays import Color, Float
+from .stencil import Planes, Stencil, Step, Taps
+from .structure import evaluate
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,7 @@ class RowMoments:
 
     planes: Planes
     taps: Taps
-    step: Step
+    step: Step[..., Any]
 
     @staticmethod
     def make(stencil: Stencil, radius: int) -> RowMoments:
@@ -31,7 +33,7 @@ class RowMoments:
         taps = planes.taps([(0, dx) for dx in range(-radius, radius + 1)], margin=radius)
         return RowMoments(planes, taps, Step(lambda taps: row_moments(stencil, taps)))
 
-    def __call__(self, color: list[Float]) -> list[Float]:
+    def __call__(self, color: Color) -> list[Float]:
         """`row_moments` of an evaluated colour, over `radius` rows more on either side."""
         self.planes.store(color)
         return self.step(self.taps)
@@ -56,7 +58,7 @@ def row_moments(stencil: Stencil, taps: Taps) -> list[Float]:
             taps.next()
         mean = total * norm
         moments += [own + mean, dr.fma(-mean, mean, squares * norm)]
-    dr.eval(moments)
+    evaluate(moments)
     return moments
 
 

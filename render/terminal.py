@@ -176,6 +176,11 @@ def _interrupted() -> NoReturn:
     sys.exit(INTERRUPTED)
 
 
+def note(sentence: str) -> None:
+    """One line beside the output, on standard error."""
+    click.echo(f"onespp: {sentence}", err=True)
+
+
 def _stop(sentence: str) -> NoReturn:
     click.echo(f"onespp: {sentence}", err=True)
     sys.exit(BAD_INPUT)

@@ -233,9 +233,11 @@ def narrowness(frame: Frame, m) -> np.ndarray:
 
 def run(frames: list[Frame], m) -> np.ndarray:
     """The colour of the last frame."""
-    settings = {"L": (m.light_alpha, m.smoothing, m.levels, m.light_sigma),
-                "G": (m.light_alpha, m.sharp_smoothing, m.sharp_levels, m.light_sigma),
-                "V": (m.visibility_alpha, m.sharp_smoothing, m.sharp_levels, m.visibility_sigma)}
+    sharp_levels = m.sharp_innovation_levels, m.sharp_output_levels
+    settings = {
+        "L": (m.light_alpha, m.innovation_levels, m.output_levels, m.light_sigma),
+        "G": (m.light_alpha, *sharp_levels, m.light_sigma),
+        "V": (m.visibility_alpha, *sharp_levels, m.visibility_sigma)}
     kept: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     energy = np.zeros(0)
     length, previous, out = np.zeros(0), None, {}
@@ -244,7 +246,7 @@ def run(frames: list[Frame], m) -> np.ndarray:
         n = np.ones(frame["id"].shape)
         if previous is not None:
             old, found = look_up(previous, frame, length[..., None], m)
-            n = np.where(found, np.minimum(old[..., 0] + 1, m.longest), 1)
+            n = np.where(found, np.minimum(old[..., 0] + 1, m.max_history_length), 1)
         out = {}
         for name, d in signals_of(frame).items():
             alpha, smoothing, levels, sigma = settings[name]
@@ -260,13 +262,13 @@ def run(frames: list[Frame], m) -> np.ndarray:
                       and "light" in frame else np.zeros(found.shape))
             a, q = np.maximum(1 / n, alpha), spread(frame, lum(e) ** 2, found, smoothing, m, narrow)
             wide = smooth(frame, e, found, smoothing, m, narrow=narrow)
-            follow = np.maximum(m.sharp_follow, a)
+            follow = np.maximum(m.sharp_min_gain, a)
             if name == "V" and previous is not None and m.follow_shadows and "light" in frame:
                 both = np.concatenate([kept[name][0], kept[name][1][..., None]], -1)
                 both, moves = shadow_history(previous, frame, both, m)
                 moves &= found
                 other = np.where(moves[..., None], d - both[..., :-1], e)
-                levels_ = min(max(5, m.sharp_smoothing), m.smoothing)
+                levels_ = min(max(5, m.sharp_innovation_levels), m.innovation_levels)
                 excess = smooth(frame, other**2 - e**2, found, levels_, m)
                 better = excess[..., 0] < 0
                 wide = np.where(excess < 0, smooth(frame, other, found, smoothing, m,
@@ -275,14 +277,14 @@ def run(frames: list[Frame], m) -> np.ndarray:
                 energy = np.maximum(energy + np.minimum(excess[..., 0], 0), 0)
                 noise = np.where(found, np.maximum(energy - s2, energy / 4), noise)
             if name != "G":
-                certain = 1 - m.doubt * q / np.maximum(lum(wide) ** 2, 1e-20)
-                follow = np.maximum(certain, m.follow if name == "L" else m.sharp_follow)
-                a = a if name == "L" else np.maximum(a, m.renewal * certain)
+                certain = 1 - m.noise_threshold * q / np.maximum(lum(wide) ** 2, 1e-20)
+                follow = np.maximum(certain, m.min_gain if name == "L" else m.sharp_min_gain)
+                a = a if name == "L" else np.maximum(a, m.change_alpha * certain)
                 follow = np.maximum(follow, a)
             history = d - (1 - a)[..., None] * e + (follow - a)[..., None] * wide
             s2 = (1 - a) ** 2 * s2 + a**2 * noise
             kept[name] = history, s2
-            fade = np.clip(1 - (n - 1) / m.fade, 0, 1)
+            fade = np.clip(1 - (n - 1) / m.fade_frames, 0, 1)
             out[name] = guided(frame, history, s2, levels, sigma, fade, narrow, m)
         length, previous = n, frame
     return repaid(color_of(frames[-1], out), frames[-1]["id"])

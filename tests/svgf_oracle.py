@@ -78,8 +78,9 @@ def level(frame: Frame, color: np.ndarray, variance: np.ndarray, step: int, sigm
     return total / weights[..., None], squares / weights**2
 
 
-def svgf(frames: list[Frame], alpha: float = 0.2, alpha_moments: float = 0.2, longest: float = 32,
-         levels: int = 5, sigma_luminance: float = 4, sigma_depth: float = 1,
+def svgf(frames: list[Frame], alpha: float = 0.2, alpha_moments: float = 0.2,
+         max_history_length: float = 32, levels: int = 5, sigma_luminance: float = 4,
+         sigma_depth: float = 1,
          normal_power: float = 128, min_cosine: float = 0.9, plane_tolerance: float = 0.02,
          demodulate: bool = True, split: bool = True, accumulate: bool = True,
          fallback: bool = True, temporal_variance: bool = True,
@@ -101,7 +102,7 @@ def svgf(frames: list[Frame], alpha: float = 0.2, alpha_moments: float = 0.2, lo
             old = oracles.reproject_bilinear(previous, frame, records, min_cosine,
                                              plane_tolerance, fallback)
         found = np.isfinite(old[..., :1])
-        length = np.where(found, np.minimum(old[..., :1] + 1, longest), 1)
+        length = np.where(found, np.minimum(old[..., :1] + 1, max_history_length), 1)
         weight = np.concatenate([np.maximum(a, 1 / length) for a in
                                  (alpha, alpha, alpha, alpha_moments, alpha_moments)], -1)
         kept, result = [length], np.zeros((*shape, 3))

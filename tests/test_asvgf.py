@@ -25,7 +25,7 @@ def with_change(frame, direct=1.0, indirect=1.0):
 def test_without_a_change_it_is_svgf_with_its_alphas():
     frames = moving(13, 17, count=5)
     unchanged = [with_change(f) for f in frames]
-    same: dict[str, Any] = {"alpha": 0.2, "alpha_indirect": 0.2, "longest": 32.0}
+    same: dict[str, Any] = {"alpha": 0.2, "alpha_indirect": 0.2, "max_history_length": 32.0}
     np.testing.assert_allclose(run(Asvgf(**same), unchanged), run(Svgf(), frames), rtol=1e-5)
     np.testing.assert_allclose(run(Asvgf(**same), frames), run(Svgf(), frames), rtol=1e-5)
 
@@ -89,8 +89,8 @@ def test_strata_add_up_samples_and_skip_what_is_none():
 def test_five_frames_one_recording_a_step():
     frames = [with_change(f, 0.9) for f in moving(9, 11, count=5)]
     _, state = run_and_keep(Asvgf(levels=2), frames)
-    steps = [*state.gradients.steps, state.gradients.spread, state.works.accumulate,
-             state.works.estimate, state.works.pack]
+    steps = [*state.gradients.steps, state.gradients.spread, state.passes.accumulate,
+             state.passes.estimate, state.passes.pack]
     assert [step.recordings for step in steps] == [1] * 7
 
 

@@ -69,12 +69,13 @@ def split(height, width, count=3):
 
 
 @pytest.mark.parametrize("shadows", [True, False])
-@pytest.mark.parametrize(("height", "width", "smoothing", "sharp_smoothing"), [
+@pytest.mark.parametrize(("height", "width", "levels", "sharp_levels"), [
     (19, 26, 4, 2), (7, 5, 4, 2), (1, 9, 4, 2), (9, 70, 7, 6), (12, 9, 6, 3)])
-def test_it_is_the_formula_in_float64(height, width, smoothing, sharp_smoothing, shadows):
+def test_it_is_the_formula_in_float64(height, width, levels, sharp_levels, shadows):
     frames = split(height, width)
-    method = FilteredInnovation(smoothing=smoothing, levels=3, sharp_smoothing=sharp_smoothing,
-                                sharp_levels=2, follow_shadows=shadows)
+    method = FilteredInnovation(
+        innovation_levels=levels, output_levels=3, sharp_innovation_levels=sharp_levels,
+        sharp_output_levels=2, follow_shadows=shadows)
     image, _ = run(method, frames)
     expected = innovation_oracle.run(frames, method)
     np.testing.assert_allclose(image, expected, rtol=1e-3, atol=5e-5)
@@ -112,7 +113,7 @@ def test_the_signals_add_up_to_the_colour():
             expected = frame["color"]
             if "emission" in names:
                 expected = expected - frame["emission"]
-            np.testing.assert_allclose(stencil.image(signals.color(signals.parts)), expected,
+            np.testing.assert_allclose(stencil.image(signals.color(signals.listed)), expected,
                                        rtol=1e-4, atol=1e-5)
 
 
@@ -157,8 +158,8 @@ def test_visibility_above_its_cap_is_not_lost():
                         + frame["unshadowed"] * visibility[..., None])
     stencil = Stencil(24, 24, 1)
     signals = read_signals(burst, read_color(burst, stencil), stencil, True, True)
-    assert stencil.image(signals.parts[-1]).max() <= 2
-    np.testing.assert_allclose(stencil.image(signals.color(signals.parts)), burst["color"],
+    assert stencil.image([signals.listed[-1].luminance]).max() <= 2
+    np.testing.assert_allclose(stencil.image(signals.color(signals.listed)), burst["color"],
                                rtol=1e-4, atol=1e-5)
 
 
@@ -189,13 +190,13 @@ def test_a_moving_object_and_its_background_keep_histories_of_their_own():
 def test_five_frames_are_one_recording_and_parameters_compile_nothing():
     frames = split(16, 20, 5)
     run(FilteredInnovation(), frames)
-    other = FilteredInnovation(light_alpha=0.1, visibility_sigma=3.0, fade=3.0, penumbra=2.0,
-                               sigma_plane=0.02, longest=9.0, plane_tolerance=0.03)
+    other = FilteredInnovation(light_alpha=0.1, visibility_sigma=3.0, fade_frames=3.0, penumbra=2.0,
+                               sigma_plane=0.02, max_history_length=9.0, plane_tolerance=0.03)
     assert compiled(lambda: run(other, frames)) == 0
     _, state = run(FilteredInnovation(), frames)
-    works = state.works
-    steps = [works.follow_shadows, works.look_back, works.merge, works.pack,
-             *(level.step for level in (*works.around, *works.smoothing, *works.levels))]
+    passes = state.passes
+    steps = [passes.follow_shadows, passes.innovations, passes.merge, passes.pack,
+             *(level.step for level in (passes.spread, *passes.smoothing, *passes.output))]
     assert [step.recordings for step in steps] == [1] * len(steps)
 
 
@@ -203,7 +204,7 @@ def test_glossy_light_is_renewed_by_no_change_where_there_is_no_visibility():
     names = ("visibility", "unshadowed")
     frames = [replace(f, images={k: v for k, v in f.images.items() if k not in names})
               for f in split(16, 20, 3)]
-    one, other = (run(FilteredInnovation(renewal=share), frames)[0] for share in (0.0, 1.0))
+    one, other = (run(FilteredInnovation(change_alpha=share), frames)[0] for share in (0.0, 1.0))
     np.testing.assert_array_equal(one, other)
 
 
@@ -225,9 +226,10 @@ def test_other_channels_halfway_are_refused():
 
 
 @pytest.mark.parametrize("settings", [
-    {"levels": 0}, {"levels": 2.0}, {"sharp_levels": 5}, {"sharp_smoothing": 1},
-    {"light_alpha": 0.0}, {"visibility_sigma": -1.0}, {"longest": 0.0}, {"follow": 0.0},
-    {"doubt": -1.0}, {"penumbra": 0.0}, {"fade": 0.0}, {"sharp_follow": 0.0}, {"renewal": 2.0}])
+    {"output_levels": 0}, {"output_levels": 2.0}, {"sharp_output_levels": 5},
+    {"sharp_innovation_levels": 1}, {"light_alpha": 0.0}, {"visibility_sigma": -1.0},
+    {"max_history_length": 0.0}, {"min_gain": 0.0}, {"noise_threshold": -1.0}, {"penumbra": 0.0},
+    {"fade_frames": 0.0}, {"sharp_min_gain": 0.0}, {"change_alpha": 2.0}])
 def test_bad_parameters_are_refused(settings):
     with pytest.raises(InputError, match=next(iter(settings))):
         FilteredInnovation(**settings)

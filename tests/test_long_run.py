@@ -15,7 +15,8 @@ from denoise.methods import METHODS, build, parameters
 
 HEIGHT, WIDTH, SIGMA, WARM = 48, 64, 0.1, 40
 STILL = make_frame(HEIGHT, WIDTH, wall_end=1e9)
-PLAIN = {"demodulate": "false", "radius": "3", "levels": "2", "sharp_levels": "2"}
+PLAIN = {"demodulate": "false", "radius": "3", "levels": "2", "output_levels": "2",
+         "sharp_output_levels": "2"}
 
 # Settings that leave accumulation alone: nothing is clamped, and no pixel is like another.
 ALONE = {"color_box": "1e6", "sigma_color": "1e-12", "sigma_luminance": "1e-12"}

@@ -15,7 +15,7 @@ SMALL = {"bilateral": {"radius": "4"}, "bilateral-separable": {"radius": "4"},
          "assignment": {"radius": "4"}, "atrous": {"levels": "3"},
          "assignment-atrous": {"levels": "3"}, "temporal": {}, "svgf": {"levels": "3"},
          "asvgf": {"levels": "3"},
-         "onespp": {"smoothing": "3", "levels": "3", "sharp_levels": "2"}}
+         "onespp": {"innovation_levels": "3", "output_levels": "3", "sharp_output_levels": "2"}}
 
 each_method = pytest.mark.parametrize("name", METHODS)
 SIZES = [(1, 1), (1, 7), (7, 1), (3, 5), (13, 17), (23, 2)]

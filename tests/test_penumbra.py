@@ -12,7 +12,7 @@ from test_renderer import gray, small_scene
 from test_shadow_motion import in_shadow, rendered, shadow_scene
 
 from denoise.filtered_innovation import FilteredInnovation
-from denoise.penumbra import light_sizes, narrowness
+from denoise.penumbra import PenumbraSample, footprint_falloff, light_sizes
 from denoise.shadow_motion import follow_shadows, read_shadow_rays
 from denoise.stencil import Stencil
 from denoise.surface import read_surface
@@ -40,9 +40,7 @@ def sharpness_of(frame):
     """(h, w) whether the ray was stopped, and q."""
     stencil = Stencil(frame.height, frame.width, 1)
     surface, rays = read_surface(frame, stencil), read_shadow_rays(frame, frame, stencil)
-    *_, blocked, q = follow_shadows(
-        stencil, rays.hits, [surface.id, *surface.normal, surface.depth], surface.position,
-        rays.table, rays.sizes, rays.matrices)
+    _, (blocked, q) = follow_shadows(stencil, rays, surface.sample, surface.position)
     return stencil.image([blocked]) > 0, stencil.image([q])
 
 
@@ -86,8 +84,8 @@ def test_a_hard_shadow_is_as_narrow_as_a_pixel():
 def test_where_nothing_was_stopped_a_filter_is_as_wide_as_ever():
     stencil = Stencil(1, 4, 1)
     share, q = stencil.Float([0, 5e-4, 0.5, 1]), stencil.Float([0, 1e-4, 0.2, 1])
-    narrow = narrowness([share, q], dr.opaque(stencil.Float, 2.0), 1e-3)
-    np.testing.assert_allclose(narrow.numpy(), [0, 0, 0.8, 2], rtol=1e-6)
+    falloff = footprint_falloff(PenumbraSample(share, q), dr.opaque(stencil.Float, 2.0), 1e-3)
+    np.testing.assert_allclose(falloff.numpy(), [0, 0, 0.8, 2], rtol=1e-6)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e38, 0.0])

@@ -66,8 +66,8 @@ def test_planes_turn_by_the_inverse_transpose_of_the_motion(board):
                     @ np.stack([np.eye(4), np.linalg.inv(board)]))
     stencil = Stencil(9, 11, 1)
     surface = read_surface(frame, stencil)
-    near = [surface.id, *surface.normal, surface.depth]
-    place = locate(stencil, near, *motion_between(previous, frame, stencil), stencil.opaque(0.02))
+    place = locate(stencil, surface.sample, motion_between(previous, frame, stencil),
+                   stencil.opaque(0.02))
     motion = (previous.camera_from_world @ previous.world_from_object
               @ np.linalg.inv(frame.world_from_object) @ np.linalg.inv(frame.camera_from_world))
     turning = np.linalg.inv(motion[:, :3, :3]).transpose(0, 2, 1)

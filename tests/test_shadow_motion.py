@@ -48,9 +48,7 @@ def motion_of(previous, frame):
     """(h, w) whether the kernel says that the shadow moves, and (h, w, 2) by how much."""
     stencil = Stencil(frame.height, frame.width, 1)
     surface, rays = read_surface(frame, stencil), read_shadow_rays(frame, previous, stencil)
-    image = stencil.image(shadow_motion(
-        stencil, rays.hits, [surface.id, *surface.normal, surface.depth], surface.position,
-        rays.table, rays.matrices))
+    image = stencil.image(shadow_motion(stencil, rays, surface.sample, surface.position))
     return image[..., 0] > 0, image[..., 1:]
 
 

@@ -2,6 +2,7 @@ import gc
 import subprocess
 import sys
 import weakref
+from typing import NamedTuple
 
 import drjit as dr
 import numpy as np
@@ -15,11 +16,17 @@ from denoise.bilateral import Bilateral
 from denoise.exponential import exp2
 from denoise.reprojection import load_table
 from denoise.stencil import Stencil, Step, Taps
+from denoise.structure import build, evaluate, flatten
 from denoise.temporal import Temporal
 from denoise.timing import timed
 from render.errors import InputError
 
 LAYOUTS = ("views", "gather")
+
+
+class Point(NamedTuple):
+    x: object
+    y: object
 
 
 def stencil_of(height, width, reach, layout="views"):
@@ -82,6 +89,22 @@ def test_rows_around_are_views_of_what_a_kernel_gave(layout):
     del array, tall
     gc.collect()
     assert np.isfinite(taps.at(4)[0].numpy()).all()  # memory that is still there
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_named_taps_in_a_step(layout):
+    """Planes filled from a structure come back as another one."""
+    stencil = stencil_of(2, 3, 1, layout)
+    planes = stencil.planes([-1.0, -2.0, -3.0])
+    planes.store([Point(stencil.constant(1), None), (stencil.constant(2), stencil.constant(3))])
+    taps = planes.taps([(0, 0), (0, 1)]).named(lambda x, y, z: Point(x, Point(y, z)))
+    step = Step(lambda taps: Point(taps.at(0).x, taps.at(1).y.x * 10 + taps.at(1).y.y))
+    for _ in range(2):
+        here, right = step(taps)
+        np.testing.assert_array_equal(stencil.image([here]), 1)
+        np.testing.assert_array_equal(stencil.image([right]), [[23, 23, -23]] * 2)
+    (some,) = planes.taps([(0, 0)], [2]).named(lambda z: [z]).at(0)
+    np.testing.assert_array_equal(stencil.image([some]), 3)
 
 
 def test_storing_again_is_seen_by_taps_made_before():
@@ -167,7 +190,7 @@ def test_a_step_holds_no_arguments_between_calls_and_goes_when_it_is_dropped():
     step = Step(lambda arrays: [arrays[0] + 1])
     step([stencil.constant(1)])
     assert not any(isinstance(value, Step) for value in vars(step).values())
-    assert step._call.arguments == ()
+    assert step._call.taps == []
     gc.disable()  # without the help of the cycle collector
     try:
         there = weakref.ref(step)
@@ -194,6 +217,99 @@ def test_dr_jit_walks_the_arguments_of_a_step_once():
 
     assert not holds(inputs[0]["nonlocals"])
     assert not holds(inputs[0]["globals"])
+
+
+class Pair(NamedTuple):
+    first: Point
+    second: Point | None
+    rest: list
+
+
+class Sums(NamedTuple):
+    total: object
+    parts: list
+    nothing: object = None
+
+
+def add_named(pair: Pair, taps: Taps, factor) -> Sums:
+    total = pair.first.x + pair.first.y * 2 + sum(pair.rest, taps.at(0)[0]) * factor
+    if pair.second is not None:
+        total += pair.second.y
+    return Sums(total, [pair.first, (pair.first.y * factor,)])
+
+
+def test_a_step_takes_and_gives_nested_named_structures():
+    stencil = stencil_of(3, 5, 1)
+    planes = stencil.planes([0.0])
+    taps = planes.taps([(0, 0)])
+    step = Step(add_named)
+    for i in (1.0, 2.0, 3.0):
+        x, y, z = (stencil.constant(10.0**power * i) for power in range(3))
+        planes.store([stencil.constant(7 * i)])
+        sums = step(Pair(Point(x, y), Point(z, z), [x, x]), taps, stencil.opaque(i))
+        assert isinstance(sums, Sums)
+        assert stencil.image([sums.total])[0].tolist() == [i + 20 * i + 9 * i * i + 100 * i] * 5
+        point, (scaled,) = sums.parts
+        assert isinstance(point, Point)
+        assert sums.nothing is None
+        assert stencil.image([point.x, point.y, scaled])[0, 0].tolist() == [i, 10 * i, 10 * i * i]
+    assert step.recordings == 1
+
+
+def test_a_step_records_again_where_something_begins_to_be_absent():
+    stencil = stencil_of(3, 5, 1)
+    taps = stencil.planes([1.0]).taps([(0, 0)])
+    step = Step(add_named)
+    one = stencil.constant(1)
+    with_none, with_point = (Pair(Point(one, one), second, [one])
+                             for second in (None, Point(one, stencil.constant(50))))
+    for pair, expected in [(with_none, 5), (with_point, 55)] * 2:
+        assert stencil.image([step(pair, taps, one).total])[0, 0] == expected
+    assert step.recordings == 2
+
+
+class Swapped(NamedTuple):
+    y: object
+    x: object
+
+
+def test_structures_of_other_classes_are_not_taken_for_one_another():
+    """Their arrays are the same list."""
+    stencil = stencil_of(1, 1, 1)
+    step = Step(lambda point: point.x - point.y)
+    one, three = stencil.constant(1), stencil.constant(3)
+    for kind, expected in ((Point, -2), (Swapped, 2), (Point, -2)):
+        assert step(kind(one, three))[0] == expected
+
+
+@pytest.mark.parametrize("wrong", [2.0, "text", {"x": 1}, np.zeros(3)])
+def test_a_step_refuses_what_would_be_recorded_as_a_constant(wrong):
+    stencil = stencil_of(1, 1, 1)
+    with pytest.raises(TypeError, match=type(wrong).__name__):
+        Step(lambda point: point.x)(Point(stencil.constant(1), wrong))
+    with pytest.raises(RuntimeError) as error:
+        Step(lambda x: Point(x, wrong))(stencil.constant(1))
+    assert isinstance(error.value.__cause__, TypeError)
+
+
+def test_a_structure_is_its_arrays_and_its_form():
+    stencil = stencil_of(1, 3, 1)
+    a, b, c = (stencil.Float(range(n)) for n in (1, 2, 3))
+    taps = stencil.planes([0.0]).taps([(0, 1)])
+    structure = Pair(Point(a, None), taps, [(b, c), [], c])
+    flat = flatten(structure)
+    assert all(x is y for x, y in zip(flat.arrays, (a, b, c, c), strict=True))
+    assert flat.taps == [taps]
+    assert build(flat.form, range(4), ["taps"]) == Pair(Point(0, None), "taps", [(1, 2), [], 3])
+    assert flatten(build(*flat)).form == flat.form
+    assert flatten(structure._replace(rest=[])).form != flat.form
+
+
+def test_evaluate_reaches_into_named_structures():
+    stencil = stencil_of(1, 3, 1)
+    point = Point(stencil.constant(1) + 1, [stencil.constant(2) + 2])
+    evaluate(point, None)
+    assert point.x.state == point.y[0].state == dr.VarState.Evaluated
 
 
 @pytest.mark.parametrize("alias_first", [True, False])

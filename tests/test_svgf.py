@@ -69,8 +69,8 @@ def test_agrees_with_the_formula_in_float64(height, width):
 
 @pytest.mark.parametrize("parameters", [
     *({part: False} for part in PARTS), {"levels": 2}, {"alpha": 0.6}, {"alpha_moments": 0.5},
-    {"longest": 1.0}, {"sigma_luminance": 3.0}, {"sigma_depth": 5.0}, {"normal_power": 8.0},
-    {"min_cosine": 0.999}, {"plane_tolerance": 1e-3}])
+    {"max_history_length": 1.0}, {"sigma_luminance": 3.0}, {"sigma_depth": 5.0},
+    {"normal_power": 8.0}, {"min_cosine": 0.999}, {"plane_tolerance": 1e-3}])
 def test_each_parameter_does_what_the_formula_says(parameters):
     frames, base = moving(14, 19, count=5), {"levels": 3, "sigma_luminance": 1.0}
     parameters = base | parameters
@@ -95,7 +95,7 @@ def test_variance_of_the_history_falls_as_one_over_n_until_alpha_is_reached():
 
 
 def test_moments_become_those_of_the_light():
-    method = Svgf(alpha_moments=0.02, longest=100.0, demodulate=False, levels=1)
+    method = Svgf(alpha_moments=0.02, max_history_length=100.0, demodulate=False, levels=1)
     moments = records(run_and_keep(method, still(60))[1])[..., 4:6]
     variance = moments[..., 1] - moments[..., 0]**2
     assert moments[..., 0].mean() == pytest.approx(1, abs=0.01)
@@ -161,20 +161,20 @@ def test_texture_and_emission_come_back_as_they_were(options):
 
 def test_five_frames_one_recording_a_step():
     _, state = run_and_keep(Svgf(levels=3), moving(9, 11, count=6))
-    works = state.works
-    steps = [works.accumulate, works.estimate, works.pack]
-    for part in works.filters:
+    passes = state.passes
+    steps = [passes.accumulate, passes.estimate, passes.pack]
+    for part in passes.filters:
         steps += [*part.scale_steps, *part.level_steps]
-    assert len(works.filters) == 2
+    assert len(passes.filters) == 2
     assert [step.recordings for step in steps] == [1] * 15
 
 
 def test_changed_parameters_compile_nothing():
     frames = moving(9, 11)
     run(Svgf(levels=2), frames)
-    changed = Svgf(levels=2, alpha=0.1, alpha_moments=0.3, longest=8.0, sigma_luminance=2.0,
-                   sigma_depth=2.0, normal_power=64.0, min_cosine=0.5, plane_tolerance=0.1,
-                   temporal_variance=False)
+    changed = Svgf(levels=2, alpha=0.1, alpha_moments=0.3, max_history_length=8.0,
+                   sigma_luminance=2.0, sigma_depth=2.0, normal_power=64.0, min_cosine=0.5,
+                   plane_tolerance=0.1, temporal_variance=False)
     assert compiled(lambda: run(changed, frames)) == 0
 
 
@@ -185,7 +185,7 @@ def test_one_and_two_threads_give_the_same():
 
 
 @pytest.mark.parametrize("parameters", [
-    {"levels": 0}, {"alpha": 0.0}, {"alpha_moments": 1.5}, {"longest": 0.5},
+    {"levels": 0}, {"alpha": 0.0}, {"alpha_moments": 1.5}, {"max_history_length": 0.5},
     {"sigma_luminance": 0.0}, {"sigma_depth": -1.0}, {"normal_power": float("inf")},
     {"min_cosine": 2.0}, {"plane_tolerance": 0.0}])
 def test_bad_parameters_are_refused(parameters):
