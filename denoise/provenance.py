@@ -12,10 +12,10 @@ from typing import Any
 from render.manifest import Run
 from render.sequence import Sequence
 
-from .interleave import Times, read_times
 from .scorecard import INPUT, Scores
 from .summary import text_of
 from .table import caption
+from .times import Times, read_times
 
 
 def commands(sequence: Sequence, methods: Iterable[str]) -> list[str]:

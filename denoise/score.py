@@ -22,13 +22,13 @@ from render.sequence import Reference, Sequence
 from .bias import split_errors
 from .cost import cost
 from .ground import read_ground
-from .interleave import read_times
 from .judge import Judge
 from .metrics import METRICS, reference_floor, spread
 from .pictures import Progress, draw_pictures
 from .provenance import commands
 from .scorecard import INPUT, MethodScore, Scores
 from .stability import MEASURES
+from .times import read_times
 from .tonemap import TONE_MAP
 
 

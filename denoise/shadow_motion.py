@@ -32,10 +32,11 @@ from render.frame import Frame
 
 from .history import look_up
 from .penumbra import light_sizes, sharpness
-from .reprojection import inverses, locate, world_motions
+from .reprojection import locate
 from .sparse import weighted_sums
 from .stencil import Float, Stencil
-from .surface import dot, screen_from_camera, transform
+from .surface import dot, transform
+from .view import inverses, screen_from_camera, world_motions
 
 AROUND = (2,)     # levels of the smoothing by which motion spreads
 CHOICE = 5        # levels of the smoothing of squared innovations
