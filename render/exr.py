@@ -4,9 +4,9 @@ ZIP compression: of the lossless ones that every viewer reads it makes the small
 frames, and decodes as fast as any.
 
 The OpenEXR library trusts a header's size, returns partial images for truncated files, and tells
-about damage on the terminal. So the header and the chunk table are parsed here first: a file that passes
-is complete and no larger than it claims, and only damage inside a compressed chunk is left for
-the library to find. It reads by `OpenEXR.File`: the older `InputFile`, which is deprecated, has
+about damage on the terminal. So the header and the chunk table are parsed here first: a file that
+passes is complete and no larger than it claims, and only damage inside a compressed chunk is left
+for the library to find. It reads by `OpenEXR.File`: the older `InputFile`, which is deprecated, has
 worker threads read a Python stream without the interpreter's lock, and that ends the process from
 Python 3.12 on. Layout: https://openexr.com/en/latest/OpenEXRFileLayout.html
 """
@@ -56,12 +56,13 @@ class Header:
 
 
 def write_exr(path: Path, channels: Mapping[str, np.ndarray],
-              header: Mapping[str, str] | None = None) -> None:
+              header: Mapping[str, str] | None = None, durable: bool = False) -> None:
     """Write an image: equal input gives equal bytes.
 
     Args:
         channels: name -> (h, w) array, stored in its own type (float32, float16 or uint32).
         header: string attributes.
+        durable: wait for the disk, as `atomic.replacing`.
 
     Raises:
         InputError: shapes or types that cannot be stored, or the disk refuses.
@@ -80,7 +81,7 @@ def write_exr(path: Path, channels: Mapping[str, np.ndarray],
     # The library writes into the dictionary it is given, so it gets one of its own.
     pixels = {name: np.ascontiguousarray(image) for name, image in channels.items()}
     OpenEXR.File(attributes, pixels, num_threads=_threads()).write(stream)
-    write_bytes(path, stream.getvalue())
+    write_bytes(path, stream.getvalue(), durable)
 
 
 def read_exr(path: Path, channels: Iterable[str] | None = None,
@@ -130,7 +131,10 @@ def _decode(path: Path, data: bytes, header: Header, names: list[str]) -> dict[s
         except Exception as error:  # whatever C++ or a strange header's objects come up with
             if any("MemoryError" in line or "bad_alloc" in line for line in said):
                 raise MemoryError from error
-            raise InputError(f"{path} is damaged and cannot be decoded: make it again") from error
+            why = "".join(said).rpartition(" - ")[2].strip() or str(error)
+            why = "".join(c for c in why if c.isprintable())[:100]
+            raise InputError(f"{path} is damaged and cannot be decoded ({why}): make it again"
+                             ) from error
     for name, image in images.items():
         if image.shape != (header.height, header.width) or image.dtype != header.channels[name]:
             raise InputError(f"{path} is damaged and cannot be decoded: make it again")
