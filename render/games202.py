@@ -27,7 +27,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .atomic import read_bytes, write_bytes
+from .atomic import all_or_none, read_bytes, write_bytes
 from .errors import InputError
 from .exr import read_exr, read_header, write_exr
 from .frame import Frame
@@ -50,7 +50,8 @@ def import_games202(folder: Path | str, out: Path | str, *, scene: str | None = 
     `command` is the command line, for the manifest.
 
     Raises:
-        InputError: no frames, or a file of one is missing, damaged, or disagrees with the rest.
+        InputError: no frames, or a file of one is missing, damaged, or disagrees with the rest;
+            of a sequence that was begun anew nothing is left.
     """
     folder = Path(folder)
     frames = sorted({i for stem in _STEMS for i in _numbers(folder, stem)})
@@ -66,22 +67,28 @@ def import_games202(folder: Path | str, out: Path | str, *, scene: str | None = 
             digest.update((folder / f"{stem}_{i}{_suffix(stem)}").read_bytes())
     name = scene or "".join(c for c in folder.resolve().name if c.isprintable()) or "import"
     digits = len(str(objects - 1))
+    new = not (Path(out) / "manifest.json").exists()
     sequence = Sequence.create(out, checked(
         Manifest, f"the sequence to make of {folder}", source="games202", scene=name,
         fingerprint=digest.hexdigest(), frames=tuple(frames), width=header.width,
         height=header.height, fps=fps, seed=None, channels=tuple(_FILES),
         commands=(command,) if command else (),
         objects=tuple(f"object_{i:0{digits}d}" for i in range(objects))), overwrite)
-    for i in frames:
-        if not sequence.has_frame(i):
-            sequence.write_frame(_read_frame(folder, i, sequence), {"scene": name})
+    try:
+        for i in frames:
+            if not sequence.has_frame(i):
+                sequence.write_frame(_read_frame(folder, i, sequence), {"scene": name})
+    except InputError:  # a mended file would make another sequence, which this one would refuse
+        if new:
+            sequence.remove()
+        raise
     return sequence
 
 
 def export_games202(sequence: Sequence, folder: Path | str) -> list[Path]:
     """Write a sequence's frames in the assignment's layout; the files written.
 
-    Frames are numbered from 0 in the sequence's order.
+    Frames are numbered from 0 in the sequence's order. All are written, or none.
 
     Raises:
         InputError: the sequence lacks a channel or a frame, or the disk refuses.
@@ -90,20 +97,23 @@ def export_games202(sequence: Sequence, folder: Path | str) -> list[Path]:
     if folder.is_dir() and max(_numbers(folder, "beauty"), default=0) >= len(sequence.frames):
         raise InputError(f"{folder} holds frames of a longer sequence, which would be taken for "
                          "this one's: choose another folder")
-    written = []
-    for k, i in enumerate(sequence.frames):
-        frame = sequence.read_frame(i, _FILES)
-        for channel, (stem, names) in _FILES.items():
-            image = frame[channel].astype(np.float32)
-            if channel == "position" and sequence.manifest.source == "render":
-                origin = np.linalg.inv(frame.camera_from_world)[:3, 3]
-                image = np.where(frame["id"][..., None] < 0, origin.astype(np.float32), image)
-            written.append(folder / f"{stem}_{k}.exr")
-            planes = np.moveaxis(np.atleast_3d(image), 2, 0)
-            write_exr(written[-1], dict(zip(names, planes)))
-        written.append(folder / f"matrix_{k}.mat")
-        write_mat(written[-1], np.concatenate([
-            frame.world_from_object, frame.camera_from_world[None], frame.screen_from_world[None]]))
+    if missing := [i for i in sequence.frames if not sequence.has_frame(i)]:
+        raise InputError(f"{sequence.folder} lacks frame {missing[0]}: render all frames first")
+    with all_or_none() as written:
+        for k, i in enumerate(sequence.frames):
+            frame = sequence.read_frame(i, _FILES)
+            for channel, (stem, names) in _FILES.items():
+                image = frame[channel].astype(np.float32)
+                if channel == "position" and sequence.manifest.source == "render":
+                    origin = np.linalg.inv(frame.camera_from_world)[:3, 3]
+                    image = np.where(frame["id"][..., None] < 0, origin.astype(np.float32), image)
+                written.append(folder / f"{stem}_{k}.exr")
+                planes = np.moveaxis(np.atleast_3d(image), 2, 0)
+                write_exr(written[-1], dict(zip(names, planes)))
+            written.append(folder / f"matrix_{k}.mat")
+            write_mat(written[-1], np.concatenate([
+                frame.world_from_object, frame.camera_from_world[None],
+                frame.screen_from_world[None]]))
     return written
 
 
@@ -124,25 +134,29 @@ def import_result(sequence: Sequence, folder: Path | str, method: str) -> list[i
     if numbers[-1] >= len(frames):
         raise InputError(f"{folder}/result_{numbers[-1]}.exr has no frame: {sequence.folder} "
                          f"has {len(frames)} frames, so results end at {len(frames) - 1}")
-    for k in numbers:
-        image = _image(folder / f"result_{k}.exr", _RGB, sequence.size)
-        sequence.write_result(method, frames[k], image)
+    try:
+        for k in numbers:
+            image = _image(folder / f"result_{k}.exr", _RGB, sequence.size)
+            sequence.write_result(method, frames[k], image)
+    except BaseException:  # the rest would stay without, or under an older run.json
+        sequence.remove_results(method)
+        raise
     sequence.write_run(method, Run(method=method, parameters={"source": "games202 result files"}))
     return [frames[k] for k in numbers]
 
 
 def export_results(sequence: Sequence, method: str, folder: Path | str) -> list[Path]:
-    """Write a method's results as `result_%d.exr`, half; the files written.
+    """Write a method's results as `result_%d.exr`, half, all or none; the files written.
 
     Raises:
         InputError: the method has no results, or the disk refuses.
     """
-    written = []
-    for k, i in enumerate(sequence.frames):
-        if sequence.has_result(method, i):
-            image = np.clip(sequence.read_result(method, i), -65504, 65504).astype(np.float16)
-            written.append(Path(folder) / f"result_{k}.exr")
-            write_exr(written[-1], dict(zip(_RGB, np.moveaxis(image, 2, 0))))
+    with all_or_none() as written:
+        for k, i in enumerate(sequence.frames):
+            if sequence.has_result(method, i):
+                image = np.clip(sequence.read_result(method, i), -65504, 65504).astype(np.float16)
+                written.append(Path(folder) / f"result_{k}.exr")
+                write_exr(written[-1], dict(zip(_RGB, np.moveaxis(image, 2, 0))))
     if not written:
         raise InputError(f"{sequence.folder} has no results of the method '{method}': "
                          "run `onespp denoise` first")
