@@ -3,4 +3,4 @@
 Knows frames (`render.frame`) and their folders (`render.sequence`), not scenes and not Mitsuba.
 """
 
-import render as _render  # noqa: F401  (finds LLVM before anything imports Dr.Jit)
+import render as _render  # noqa: F401  (has LLVM found before anything imports Dr.Jit)

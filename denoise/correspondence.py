@@ -17,8 +17,7 @@ import numpy as np
 
 from render.frame import Frame
 
-from .reprojection import world_motions
-from .surface import camera_from_screen
+from .view import camera_from_screen, world_motions
 
 GUIDES = ("normal", "depth", "id")
 MIN_COSINE, PLANE_TOLERANCE = 0.9, 0.02

@@ -8,8 +8,8 @@ from typing import Any
 from render.manifest import Run
 from render.sequence import Sequence
 
-from .interleave import Times
 from .parameters import present_parameters
+from .times import Times
 
 STARTING = 3  # frames in which kernels compile: a history's are first needed in the second
 

@@ -8,6 +8,7 @@ is how many there are. The line is split as a shell would, and no shell runs it.
 from __future__ import annotations
 
 import shlex
+import signal
 import subprocess
 import tempfile
 import time
@@ -22,6 +23,7 @@ from render.terminal import readable
 
 from .methods import check_not_a_method
 
+_LAST_LINES, _MOST_LETTERS = 3, 300
 PLACES: tuple[str, ...] = ("{input}", "{output}", "{frames}")
 
 
@@ -35,8 +37,8 @@ def denoise_externally(sequence: Sequence, command: str, name: str, typed: str =
         writing of files, over the number of frames: the same for all of them.
 
     Raises:
-        InputError: the command cannot be used or fails (the message has its exit code and the
-            last line it wrote to stderr), or it left no results, or bad ones.
+        InputError: the command cannot be used or fails, or it left no results, or bad ones; the
+            message has its exit code and the last lines it wrote.
     """
     check_result_name(name, sequence.methods())
     check_not_a_method(name, "external")
@@ -48,11 +50,16 @@ def denoise_externally(sequence: Sequence, command: str, name: str, typed: str =
         made.mkdir()
         export_games202(sequence, given)
         places = dict(zip(PLACES, (str(given), str(made), str(len(sequence.frames)))))
-        ms = _run([_filled(word, places) for word in words]) / len(sequence.frames)
+        said, ms = _run([_filled(word, places) for word in words])
+        ms /= len(sequence.frames)
         sequence.remove_results(name)
-        done = import_result(sequence, made, name)
-    said = {"external": readable(command), "timing": "whole program, with files"}
-    run = Run(method="external", parameters=said, device="external", machine=machine(),
+        try:
+            done = import_result(sequence, made, name)
+        except InputError as error:  # a program may fail with exit code 0
+            raise InputError(f"{error}{said}".replace(f"{made}/", "").replace(
+                str(made), "the output folder")) from error
+    settings = {"external": readable(command), "timing": "whole program, with files"}
+    run = Run(method="external", parameters=settings, device="external", machine=machine(),
               command=typed, first_ms=ms, ms=dict.fromkeys(done, ms))
     sequence.write_run(name, run)
     return run
@@ -76,18 +83,34 @@ def _filled(word: str, places: dict[str, str]) -> str:
     return word
 
 
-def _run(words: list[str]) -> float:
-    """Wall time of a program in milliseconds; InputError where it fails."""
+def _run(words: list[str]) -> tuple[str, float]:
+    """What a program said last, and its wall time in milliseconds; InputError where it fails."""
     started = time.perf_counter()
     try:
-        done = subprocess.run(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                              stderr=subprocess.PIPE, check=False)
+        done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True,
+                              check=False)
     except OSError as error:
         raise InputError(f"{words[0]} could not be started ({error.strerror}): give a program "
                          "that exists and may be run") from None
+    ms = 1e3 * (time.perf_counter() - started)
+    said = _last_words(done.stderr, "stderr") + _last_words(done.stdout, "stdout")
     if done.returncode:
-        lines = done.stderr.decode(errors="replace").strip().splitlines()
-        said = "".join(c if c.isprintable() else "?" for c in lines[-1])[:300] if lines else ""
-        raise InputError(f"{words[0]} failed with exit code {done.returncode}"
-                         + (f", its last line was: {said}" if said else " and said nothing"))
-    return 1e3 * (time.perf_counter() - started)
+        how = (f"failed with exit code {done.returncode}" if done.returncode > 0 else
+               f"was ended by {_signal(-done.returncode)}")
+        raise InputError(f"{words[0]} {how}{said or ' and said nothing'}")
+    return said, ms
+
+
+def _last_words(output: bytes, stream: str) -> str:
+    """The last lines of a program's output, as the end of a sentence; "" where there are none."""
+    lines = [line for line in output[-4000:].decode(errors="replace").splitlines() if line.strip()]
+    text = " / ".join("".join(c if c.isprintable() else "?" for c in line.strip())
+                      for line in lines[-_LAST_LINES:])
+    return f"; its last words on {stream}: {text[-_MOST_LETTERS:]}" if text else ""
+
+
+def _signal(number: int) -> str:
+    try:
+        return f"the signal {signal.Signals(number).name}"
+    except ValueError:
+        return f"signal {number}"

@@ -9,52 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import drjit as dr
 import numpy as np
-from pydantic import FiniteFloat
 
 from render import backend
 from render.atomic import write_text
 from render.errors import InputError
-from render.json_file import JsonFile, format_json, read_json
+from render.json_file import format_json
 from render.machine import machine
 from render.sequence import Sequence
 
 from .methods import Method, channels_read, parameters
+from .times import MethodTime, Times
 from .timing import timed
-
-
-class MethodTime(JsonFile):
-    """Milliseconds a frame: median and quartiles, and the same of the ratio to the first method."""
-
-    parameters: dict[str, Any]
-    first_ms: FiniteFloat
-    ms: FiniteFloat
-    ms_quartiles: tuple[FiniteFloat, FiniteFloat]
-    ratio: FiniteFloat
-    ratio_quartiles: tuple[FiniteFloat, FiniteFloat]
-
-
-class Times(JsonFile):
-    """times.json.
-
-    Attributes:
-        steps: measurements of each method that count. ratio_to: the first method.
-        command: the command line, as it was typed.
-    """
-
-    size: tuple[int, int]
-    frames: int
-    steps: int
-    device: str
-    threads: int
-    machine: str
-    command: str = ""
-    ratio_to: str
-    methods: dict[str, MethodTime]
 
 
 def time_methods(sequence: Sequence, methods: Mapping[str, Method], frames: int = 4,
@@ -94,12 +62,6 @@ def time_methods(sequence: Sequence, methods: Mapping[str, Method], frames: int 
                   methods=_summary(methods, ms, len(loaded)))
     write_text(sequence.folder / "times.json", format_json(times))
     return times
-
-
-def read_times(folder: Path) -> Times | None:
-    """The times in a sequence's folder, None if there are none; InputError if damaged."""
-    path = folder / "times.json"
-    return read_json(path, Times) if path.exists() else None
 
 
 def _summary(methods: Mapping[str, Method], ms: dict[str, list[float]],

@@ -29,7 +29,7 @@ from render.frame import Frame
 
 from .arrays import Bool, Float
 from .stencil import Stencil
-from .surface import camera_from_screen
+from .view import camera_from_screen
 
 _SAMPLES = 2048   # pixels that sizes of lights are estimated from
 _FEWEST = 4       # points of a light, or its size is not known

@@ -12,11 +12,11 @@ from typing import Any
 from render.manifest import Run
 from render.sequence import Sequence
 
-from .interleave import Times, read_times
 from .parameters import present_parameters
 from .scorecard import INPUT, Scores
 from .summary import text_of
 from .table import caption
+from .times import Times, read_times
 
 
 def commands(sequence: Sequence, methods: Iterable[str]) -> list[str]:

@@ -18,7 +18,7 @@ from pathlib import Path
 import jinja2
 import numpy as np
 
-from render.atomic import write_text
+from render.atomic import all_or_none, write_text
 from render.channels import IDS, RADIANCE
 from render.errors import InputError
 from render.sequence import Sequence
@@ -55,11 +55,13 @@ def write_report(sequence: Sequence, scores: Scores, channels: Iterable[str] | N
     histograms = {name: np.zeros(len(EDGES) - 1) for name in scores.methods}
     ranges: dict[str, tuple[float, float]] = {"roughness": (0.0, 1.0)}
     written: set[Path] = set()
-    with ThreadPoolExecutor() as pool:
+    with all_or_none() as new, ThreadPoolExecutor() as pool:
         for n, frame in enumerate(scores.frames):
             def write(job: tuple[str, np.ndarray, packed.Kind], frame: int = frame) -> Path:
                 key = f"{job[0]}/{frame:04d}"
                 path = folder / "data" / f"{key}.js"
+                if not path.exists():
+                    new.append(path)  # the others belong to the page that is there
                 write_text(path, packed.pack(key, job[1], job[2]))
                 return path
 

@@ -34,15 +34,8 @@ from render.frame import Frame
 
 from .arrays import Bool, Color, Float, Matrix3, UInt, Vector3
 from .stencil import Stencil
-from .surface import (
-    SurfaceSample,
-    camera_from_screen,
-    cross,
-    dot,
-    opaque_matrix,
-    screen_from_camera,
-    transform,
-)
+from .surface import SurfaceSample, cross, dot, opaque_matrix, transform
+from .view import camera_from_screen, screen_from_camera, world_motions
 
 LEAST_WEIGHT = 0.01
 WORDS = 8            # a pixel of packed history: colour 3, object ID, normal 3, depth
@@ -91,27 +84,6 @@ def motion_table(previous: Frame, current: Frame) -> np.ndarray:
     if _same_view(previous, current):
         table[(motion == np.eye(4)).all((1, 2))] = 0
     return table.astype(np.float32)
-
-
-def world_motions(previous: Frame, current: Frame) -> np.ndarray:
-    """(objects, 4, 4) M' M^-1, exactly the identity for an object at rest; NaN for one that only
-    one of the frames has, or whose M has changed and cannot be inverted."""
-    before = np.full(current.world_from_object.shape, np.nan)
-    count = min(len(before), len(previous.world_from_object))
-    before[:count] = previous.world_from_object[:count]
-    motion = before @ inverses(current.world_from_object)
-    motion[(before == current.world_from_object).all((1, 2))] = np.eye(4)
-    return motion
-
-
-def inverses(matrices: np.ndarray) -> np.ndarray:
-    """(n, k, k) inverses, NaN where there is none."""
-    try:
-        return np.linalg.inv(matrices)
-    except np.linalg.LinAlgError:
-        if len(matrices) == 1:
-            return np.full(matrices.shape, np.nan)
-        return np.concatenate([inverses(matrix[None]) for matrix in matrices])
 
 
 def _same_view(previous: Frame, current: Frame) -> bool:

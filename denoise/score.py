@@ -22,7 +22,6 @@ from render.sequence import Reference, Sequence
 from .bias import split_errors
 from .cost import cost
 from .ground import read_ground
-from .interleave import read_times
 from .judge import Judge
 from .means import identical, mean_decibels, mean_over_frames
 from .metrics import HEADLINE, METRICS, PSNR_CAP, non_finite, reference_floor, spread
@@ -30,6 +29,7 @@ from .pictures import Progress, draw_pictures
 from .provenance import commands
 from .scorecard import INPUT, MethodScore, Scores
 from .stability import MEASURES
+from .times import read_times
 from .tonemap import TONE_MAP
 
 MOST_LOST = 0.01

@@ -32,24 +32,11 @@ from render.frame import Frame
 from .arrays import Bool, Float, Matrix3, Vector3
 from .history import look_up
 from .penumbra import PenumbraSample, light_sizes, penumbra_samples
-from .reprojection import (
-    Motion,
-    ReprojectionTests,
-    ScreenShift,
-    inverses,
-    locate,
-    world_motions,
-)
+from .reprojection import Motion, ReprojectionTests, ScreenShift, locate
 from .sparse import weighted_sums
 from .stencil import Stencil
-from .surface import (
-    SurfaceSample,
-    TangentPlane,
-    dot,
-    opaque_matrix,
-    screen_from_camera,
-    transform,
-)
+from .surface import SurfaceSample, TangentPlane, dot, opaque_matrix, transform
+from .view import inverses, screen_from_camera, world_motions
 
 SPREAD_LEVEL = 2  # of the smoothing by which motion spreads
 CHOICE_LEVELS = 5  # of the smoothing of squared innovations

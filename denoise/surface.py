@@ -25,6 +25,7 @@ from render.frame import Frame
 
 from .arrays import Bool, Color, Float, Matrix3, Vector3
 from .stencil import Stencil
+from .view import camera_from_screen
 
 GUIDES = ("normal", "depth", "id")
 LUMINANCE = (0.2126, 0.7152, 0.0722)
@@ -83,31 +84,6 @@ class Surface:
     @property
     def sample(self) -> SurfaceSample:
         return SurfaceSample(self.id, self.normal, self.depth)
-
-
-def camera_from_screen(frame: Frame) -> np.ndarray:
-    """B: (3, 3) float64 that maps a pixel's u to its camera-space position at depth 1.
-
-    Raises:
-        InputError: the frame's matrices are not those of a pinhole camera.
-    """
-    try:
-        return np.linalg.inv(screen_from_camera(frame))
-    except np.linalg.LinAlgError:
-        raise InputError(f"the matrices of frame {frame.index} do not project to a screen: "
-                         "screen_from_world is singular") from None
-
-
-def screen_from_camera(frame: Frame) -> np.ndarray:
-    """B^-1, (3, 3) float64: rows x, y and depth of u.
-
-    A pinhole at the camera's origin has no fourth column.
-    """
-    try:
-        world_from_camera = np.linalg.inv(frame.camera_from_world)
-    except np.linalg.LinAlgError:
-        raise InputError(f"camera_from_world of frame {frame.index} is singular") from None
-    return (frame.screen_from_world @ world_from_camera)[[0, 1, 3], :3]
 
 
 def read_surface(frame: Frame, stencil: Stencil) -> Surface:

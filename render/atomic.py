@@ -25,11 +25,16 @@ def is_temporary(path: Path) -> bool:
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
     """Yields a temporary path in the same folder; renames it to `path` when the block succeeds.
 
     When the block fails, for whatever reason (an interrupt too), the temporary file is removed
     and an older `path` stays as it was. Missing folders are made.
+
+    Args:
+        durable: the file has reached the disk before it gets its name, and the name when this
+            returns. Without, a loss of power soon after may leave an empty file under a name
+            that says it is whole: good enough for what is made again in a second.
 
     Raises:
         InputError: the file system refuses (full, read-only, no permission, not a folder).
@@ -39,7 +44,11 @@ def replacing(path: Path) -> Iterator[Path]:
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary.unlink(missing_ok=True)  # a link put there would lead the write elsewhere
         yield temporary
+        if durable:
+            _sync(temporary)
         os.replace(temporary, path)
+        if durable:
+            _sync(path.parent)
     except OSError as error:
         raise InputError(explain(path, error)) from error
     finally:
@@ -48,9 +57,48 @@ def replacing(path: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
-def write_bytes(path: Path, data: bytes) -> None:
+@contextmanager
+def all_or_none() -> Iterator[list[Path]]:
+    """Yields a list, for the paths of files that belong together, each put in before it is written.
+
+    When the block fails, for whatever reason, they are removed, and the folders that this empties:
+    half a set would be taken for a whole one.
+    """
+    paths: list[Path] = []
+    try:
+        yield paths
+    except BaseException:
+        for path in paths:
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)
+        for folder in sorted({parent for path in paths for parent in path.parents[:3]},
+                             key=lambda folder: -len(folder.parts)):
+            with contextlib.suppress(OSError):  # not empty
+                folder.rmdir()
+        raise
+
+
+def _sync(path: Path) -> None:
+    """Wait until a file's bytes, or the names in a folder, are on the disk."""
+    folder = path.is_dir()
+    try:
+        descriptor = os.open(path, os.O_RDONLY if folder else os.O_RDWR)
+    except PermissionError:
+        if folder:
+            return  # Windows opens no folders, and keeps names in a journal
+        raise
+    try:
+        os.fsync(descriptor)
+    except OSError as error:  # some network drives cannot; a disk that fails says something else
+        if error.errno not in (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP):
+            raise
+    finally:
+        os.close(descriptor)
+
+
+def write_bytes(path: Path, data: bytes, durable: bool = False) -> None:
     """Write a whole file; see `replacing`."""
-    with replacing(path) as temporary:
+    with replacing(path, durable) as temporary:
         temporary.write_bytes(data)
 
 

@@ -11,8 +11,10 @@ import ctypes
 import ctypes.util
 import os
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from importlib.abc import MetaPathFinder
 from pathlib import Path
 
 from .errors import InputError
@@ -80,8 +82,35 @@ def find_llvm() -> LLVM | None:
     return unusable
 
 
+class _BeforeDrjit(MetaPathFinder):
+    """Finds no module: it is asked first for every one, and acts when Dr.Jit's turn has come.
+
+    Python's own hook for it. To look for LLVM at every import of ours instead would load the
+    library (100 MB) to read its version, in programs that never compile a kernel.
+    """
+
+    def find_spec(self, fullname: str, path: Sequence[str] | None,
+                  target: object = None) -> None:
+        if fullname in ("drjit", "mitsuba"):
+            if self in sys.meta_path:
+                sys.meta_path.remove(self)
+            prepare()
+
+
+def prepare_before_drjit() -> None:
+    """Have `prepare` called just before Dr.Jit is imported, or now where it has been.
+
+    Raises:
+        InputError: as `prepare`.
+    """
+    if "drjit" in sys.modules:
+        prepare()
+    else:
+        sys.meta_path.insert(0, _BeforeDrjit())
+
+
 def prepare() -> None:
-    """Point Dr.Jit at a usable LLVM. Call before the first import of drjit; cheap, idempotent.
+    """Point Dr.Jit at a usable LLVM. Called before the first import of drjit.
 
     Raises:
         InputError: Dr.Jit was imported before and has loaded an LLVM that it would crash with.

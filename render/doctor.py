@@ -8,12 +8,14 @@ import platform
 import sys
 import tempfile
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 from . import backend
 from .errors import InputError
 from .memory import BASE_BYTES, BYTES_PER_PIXEL, free_memory
+from .trials import TRIALS, Trial, TrialError, attempt
 
 PACKAGES = ("mitsuba", "drjit", "OpenEXR", "numpy")
 
@@ -28,9 +30,12 @@ class Finding:
 
 
 def examine() -> Iterator[Finding]:
-    """Look at everything that a command needs; never raises, never crashes the process."""
-    for look in (_python, _packages, _llvm, _cuda, _threads, _memory, _text, _kernel_cache, _kernel,
-                 _ffmpeg):
+    """Look at everything that a command needs; never raises, never crashes the process.
+
+    Libraries are tried in processes of their own (`trials.py`).
+    """
+    for look in (_python, _packages, _llvm, _cuda, _threads, _memory, _text, _kernel_cache,
+                 _trials):
         try:
             yield from look()
         except Exception as error:  # a diagnosis must outlive what it diagnoses
@@ -70,12 +75,10 @@ def _cuda() -> Iterator[Finding]:
 
 
 def _threads() -> Iterator[Finding]:
-    import drjit as dr
-
     affinity = getattr(os, "sched_getaffinity", None)
     allowed = len(affinity(0)) if affinity else os.cpu_count()
     slow = "; rendering and denoising take turns with all else" if allowed == 1 else ""
-    yield Finding("threads", "note" if slow else "ok", f"{dr.thread_count()} for kernels, "
+    yield Finding("threads", "note" if slow else "ok",
                   f"{allowed} processor{'s' * (allowed != 1)} allowed{slow}")
 
 
@@ -122,24 +125,26 @@ def _kernel_cache() -> Iterator[Finding]:
                       "set DRJIT_CACHE_DIR to a folder of yours")
 
 
-def _kernel() -> Iterator[Finding]:
-    """Compile and run something on the device that would be used."""
-    import drjit as dr
+def _trials() -> Iterator[Finding]:
+    """Every library, tried on something small; those that need not be there, where they are."""
+    there = {name: trial for name, trial in TRIALS.items() if not trial.without or _has(trial)}
+    with ThreadPoolExecutor(2) as pool:
+        tried = {name: pool.submit(attempt, name) for name in there}
+        for name, trial in TRIALS.items():
+            try:
+                said = tried[name].result() if name in tried else ""
+            except TrialError as error:
+                yield Finding(name, "note" if trial.without else "bad",
+                              f"{error}" + (f"; {trial.without}" if trial.without else ""))
+            else:
+                yield Finding(name, "ok", said) if said else Finding(
+                    name, "note", f"not installed: {trial.without}; if you want it, run "
+                    f"`{sys.executable} -m pip install {trial.package}`")
 
-    device = backend.choose()
-    module = {"llvm": dr.llvm, "cuda": dr.cuda}[device]
-    total = dr.sum(module.Float(dr.arange(module.UInt32, 1000)))[0]
-    yield Finding("test kernel", "ok" if total == 499500 else "bad",
-                  f"ran on {device}" if total == 499500 else f"wrong result on {device}: {total}")
 
-
-def _ffmpeg() -> Iterator[Finding]:
-    import imageio_ffmpeg
-
+def _has(trial: Trial) -> bool:
     try:
-        yield Finding("ffmpeg", "ok", imageio_ffmpeg.get_ffmpeg_exe())
-    except RuntimeError:
-        yield Finding("ffmpeg", "note",
-                      "none for this platform: videos are left out; install ffmpeg")
-
-
+        importlib.metadata.version(trial.package)
+    except importlib.metadata.PackageNotFoundError:
+        return False
+    return True

@@ -4,9 +4,11 @@ ZIP compression: of the lossless ones that every viewer reads it makes the small
 frames, and decodes as fast as any.
 
 The OpenEXR library trusts a header's size, returns partial images for truncated files, and tells
-about damage on stderr. So the header and the chunk table are parsed here first: a file that passes
-is complete and no larger than it claims, and only damage inside a compressed chunk is left for
-the library to find. Layout: https://openexr.com/en/latest/OpenEXRFileLayout.html
+about damage on the terminal. So the header and the chunk table are parsed here first: a file that
+passes is complete and no larger than it claims, and only damage inside a compressed chunk is left
+for the library to find. It reads by `OpenEXR.File`: the older `InputFile`, which is deprecated, has
+worker threads read a Python stream without the interpreter's lock, and that ends the process from
+Python 3.12 on. Layout: https://openexr.com/en/latest/OpenEXRFileLayout.html
 """
 
 from __future__ import annotations
@@ -15,10 +17,14 @@ import io
 import math
 import os
 import struct
-from collections.abc import Iterable, Mapping
+import sys
+import threading
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any, TextIO
 
 import numpy as np
 import OpenEXR
@@ -50,12 +56,13 @@ class Header:
 
 
 def write_exr(path: Path, channels: Mapping[str, np.ndarray],
-              header: Mapping[str, str] | None = None) -> None:
+              header: Mapping[str, str] | None = None, durable: bool = False) -> None:
     """Write an image: equal input gives equal bytes.
 
     Args:
         channels: name -> (h, w) array, stored in its own type (float32, float16 or uint32).
         header: string attributes.
+        durable: wait for the disk, as `atomic.replacing`.
 
     Raises:
         InputError: shapes or types that cannot be stored, or the disk refuses.
@@ -74,7 +81,7 @@ def write_exr(path: Path, channels: Mapping[str, np.ndarray],
     # The library writes into the dictionary it is given, so it gets one of its own.
     pixels = {name: np.ascontiguousarray(image) for name, image in channels.items()}
     OpenEXR.File(attributes, pixels, num_threads=_threads()).write(stream)
-    write_bytes(path, stream.getvalue())
+    write_bytes(path, stream.getvalue(), durable)
 
 
 def read_exr(path: Path, channels: Iterable[str] | None = None,
@@ -102,20 +109,69 @@ def read_exr(path: Path, channels: Iterable[str] | None = None,
     if missing:
         raise InputError(f"{path} lacks the channel {', '.join(missing)} "
                          f"(it has {', '.join(map(repr, header.channels))})")
-    _threads()
-    try:
-        # Not `OpenEXR.File`, which turns a failed decode into a warning and an unset image.
-        decoded = OpenEXR.InputFile(io.BytesIO(data)).channels(names)
-        images = {name: np.frombuffer(pixels, header.channels[name])
-                  .reshape(header.height, header.width) for name, pixels in zip(names, decoded)}
-    except (OSError, ValueError, TypeError, RuntimeError) as error:
-        raise InputError(f"{path} is damaged and cannot be decoded: make it again") from error
+    images = _decode(path, data, header, names)
     return images, header
 
 
 def read_header(path: Path) -> Header:
     """The header of a complete image, without its pixels; InputError as `read_exr`."""
     return _check(path, read_bytes(path))
+
+
+def _decode(path: Path, data: bytes, header: Header, names: list[str]) -> dict[str, np.ndarray]:
+    """name -> read-only pixels of a file that `_check` has passed."""
+    stream = io.BytesIO(data)
+    with _unprinted() as said:
+        try:
+            with OpenEXR.File(stream, separate_channels=True, num_threads=_threads()) as file:
+                decoded = file.channels()  # ValueError where decoding failed: that is only printed
+                images = {name: decoded[name].pixels for name in names}
+        except MemoryError:
+            raise
+        except Exception as error:  # whatever C++ or a strange header's objects come up with
+            if any("MemoryError" in line or "bad_alloc" in line for line in said):
+                raise MemoryError from error
+            why = "".join(said).rpartition(" - ")[2].strip() or str(error)
+            why = "".join(c for c in why if c.isprintable())[:100]
+            raise InputError(f"{path} is damaged and cannot be decoded ({why}): make it again"
+                             ) from error
+    for name, image in images.items():
+        if image.shape != (header.height, header.width) or image.dtype != header.channels[name]:
+            raise InputError(f"{path} is damaged and cannot be decoded: make it again")
+        image.flags.writeable = False
+    return images
+
+
+class _Listener:
+    """Stands for `sys.stdout`: keeps what one thread prints, and passes on all else."""
+
+    def __init__(self, stdout: TextIO | None) -> None:
+        self._thread, self._stdout = threading.get_ident(), stdout
+        self.lines: list[str] = []
+
+    def write(self, text: str) -> int:
+        if threading.get_ident() == self._thread or self._stdout is None:
+            self.lines.append(text)
+            return len(text)
+        return self._stdout.write(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stdout, name)
+
+
+_LISTENING = threading.Lock()  # else two threads might leave each other's listener in place
+
+
+@contextmanager
+def _unprinted() -> Iterator[list[str]]:
+    """Keeps from the output what the library prints there, for a table may be on its way to it."""
+    with _LISTENING:
+        stdout, listener = sys.stdout, _Listener(sys.stdout)
+        sys.stdout = listener
+        try:
+            yield listener.lines
+        finally:
+            sys.stdout = stdout
 
 
 @cache

@@ -31,7 +31,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .atomic import read_bytes, write_bytes
+from .atomic import all_or_none, read_bytes, write_bytes
 from .conventions import check_frame, check_motion
 from .errors import InputError
 from .exr import read_exr, read_header, write_exr
@@ -66,7 +66,8 @@ def import_games202(folder: Path | str, out: Path | str, *, scene: str | None = 
         tell: called with a sentence on what a user should know, as gaps in the numbers.
 
     Raises:
-        InputError: no frames, or a file of one is missing, damaged, or disagrees with the rest.
+        InputError: no frames, or a file of one is missing, damaged, or disagrees with the rest;
+            of a sequence that was begun anew nothing is left.
     """
     folder = Path(folder)
     found = find_files(folder)
@@ -85,23 +86,29 @@ def import_games202(folder: Path | str, out: Path | str, *, scene: str | None = 
         _check_conventions(found, size, objects)
     name = scene or found.name
     digits = len(str(objects - 1))
+    new = not (Path(out) / "manifest.json").exists()
     sequence = Sequence.create(out, checked(
         Manifest, f"the sequence to make of {folder}", source="games202", scene=name,
         fingerprint=digest.hexdigest(), frames=tuple(frames), width=header.width,
         height=header.height, fps=fps, seed=None, channels=tuple(_FILES),
         commands=(command,) if command else (),
         objects=tuple(f"object_{i:0{digits}d}" for i in range(objects))), overwrite)
-    for i in frames:
-        if not sequence.has_frame(i):
-            frame = _read_frame(found, i, size, objects)
-            if check:
-                _check_convention(found, frame)
-            sequence.write_frame(frame, {"scene": name})
-    for a, b in gaps(frames):
-        tell(f"there is no frame between {a} and {b}: methods with a history take {b} for the "
-             f"frame after {a}")
-    _take_references(found, sequence, tell)
-    _take_results(found, sequence, tell)
+    try:
+        for i in frames:
+            if not sequence.has_frame(i):
+                frame = _read_frame(found, i, size, objects)
+                if check:
+                    _check_convention(found, frame)
+                sequence.write_frame(frame, {"scene": name})
+        for a, b in gaps(frames):
+            tell(f"there is no frame between {a} and {b}: methods with a history take {b} for the "
+                 f"frame after {a}")
+        _take_references(found, sequence, tell)
+        _take_results(found, sequence, tell)
+    except InputError:  # a mended file would make another sequence, which this one would refuse
+        if new:
+            sequence.remove()
+        raise
     return sequence
 
 
@@ -164,7 +171,7 @@ def _run_of_files(folder: Path) -> Run:
 def export_games202(sequence: Sequence, folder: Path | str) -> list[Path]:
     """Write a sequence's frames in the assignment's layout; the files written.
 
-    Frames are numbered from 0 in the sequence's order.
+    Frames are numbered from 0 in the sequence's order. All are written, or none.
 
     Raises:
         InputError: the sequence lacks a channel or a frame, or the disk refuses.
@@ -173,20 +180,23 @@ def export_games202(sequence: Sequence, folder: Path | str) -> list[Path]:
     if folder.is_dir() and max(numbered(folder, "beauty"), default=0) >= len(sequence.frames):
         raise InputError(f"{folder} holds frames of a longer sequence, which would be taken for "
                          "this one's: choose another folder")
-    written = []
-    for k, i in enumerate(sequence.frames):
-        frame = sequence.read_frame(i, _FILES)
-        for channel, (stem, names) in _FILES.items():
-            image = frame[channel].astype(np.float32)
-            if channel == "position" and sequence.manifest.source == "render":
-                origin = np.linalg.inv(frame.camera_from_world)[:3, 3]
-                image = np.where(frame["id"][..., None] < 0, origin.astype(np.float32), image)
-            written.append(folder / f"{stem}_{k}.exr")
-            planes = np.moveaxis(np.atleast_3d(image), 2, 0)
-            write_exr(written[-1], dict(zip(names, planes)))
-        written.append(folder / f"matrix_{k}.mat")
-        write_mat(written[-1], np.concatenate([
-            frame.world_from_object, frame.camera_from_world[None], frame.screen_from_world[None]]))
+    if missing := [i for i in sequence.frames if not sequence.has_frame(i)]:
+        raise InputError(f"{sequence.folder} lacks frame {missing[0]}: render all frames first")
+    with all_or_none() as written:
+        for k, i in enumerate(sequence.frames):
+            frame = sequence.read_frame(i, _FILES)
+            for channel, (stem, names) in _FILES.items():
+                image = frame[channel].astype(np.float32)
+                if channel == "position" and sequence.manifest.source == "render":
+                    origin = np.linalg.inv(frame.camera_from_world)[:3, 3]
+                    image = np.where(frame["id"][..., None] < 0, origin.astype(np.float32), image)
+                written.append(folder / f"{stem}_{k}.exr")
+                planes = np.moveaxis(np.atleast_3d(image), 2, 0)
+                write_exr(written[-1], dict(zip(names, planes)))
+            written.append(folder / f"matrix_{k}.mat")
+            write_mat(written[-1], np.concatenate([
+                frame.world_from_object, frame.camera_from_world[None],
+                frame.screen_from_world[None]]))
     return written
 
 
@@ -207,24 +217,28 @@ def import_result(sequence: Sequence, folder: Path | str, method: str) -> list[i
     if (last := max(files)) >= len(frames):
         raise InputError(f"{files[last]} has no frame: {sequence.folder} "
                          f"has {len(frames)} frames, so results end at {len(frames) - 1}")
-    for k, path in files.items():
-        sequence.write_result(method, frames[k], _image(path, _RGB, sequence.size))
+    try:
+        for k, path in files.items():
+            sequence.write_result(method, frames[k], _image(path, _RGB, sequence.size))
+    except BaseException:  # the rest would stay without, or under an older run.json
+        sequence.remove_results(method)
+        raise
     sequence.write_run(method, _run_of_files(folder))
     return [frames[k] for k in files]
 
 
 def export_results(sequence: Sequence, method: str, folder: Path | str) -> list[Path]:
-    """Write a method's results as `result_%d.exr`, half; the files written.
+    """Write a method's results as `result_%d.exr`, half, all or none; the files written.
 
     Raises:
         InputError: the method has no results, or the disk refuses.
     """
-    written = []
-    for k, i in enumerate(sequence.frames):
-        if sequence.has_result(method, i):
-            image = np.clip(sequence.read_result(method, i), -65504, 65504).astype(np.float16)
-            written.append(Path(folder) / f"result_{k}.exr")
-            write_exr(written[-1], dict(zip(_RGB, np.moveaxis(image, 2, 0))))
+    with all_or_none() as written:
+        for k, i in enumerate(sequence.frames):
+            if sequence.has_result(method, i):
+                image = np.clip(sequence.read_result(method, i), -65504, 65504).astype(np.float16)
+                written.append(Path(folder) / f"result_{k}.exr")
+                write_exr(written[-1], dict(zip(_RGB, np.moveaxis(image, 2, 0))))
     if not written:
         raise InputError(f"{sequence.folder} has no results of the method '{method}': "
                          "run `onespp denoise` first")

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import contextlib
 import datetime
+import errno
 import os
 import platform
 from collections.abc import Iterator
@@ -29,6 +30,7 @@ try:
 except ImportError:
     fcntl = None
 
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 _RESULTS = "denoise-"
 _PLACES = {"render": ("frames/*", "reference/*", "*.manifest.json"), "time": ("*.times.json",),
            "score": ("pictures/*", "*.scores.*"), "report": ("report/**/*",)}
@@ -101,8 +103,12 @@ def _open(path: Path) -> int:
             who = os.read(descriptor, 300).decode(errors="replace")
             os.close(descriptor)
             raise InputError(_busy(path, who)) from None
-        except OSError:
-            return descriptor  # this file system has no locks
+        except OSError as error:
+            if error.errno in _NO_LOCKS:
+                return descriptor
+            os.close(descriptor)
+            raise InputError(f"{path} could not be locked ({error.strerror or error}): check the "
+                             "file system of the output folder, or use another folder") from error
         with contextlib.suppress(OSError):
             if os.path.samestat(os.stat(path), os.fstat(descriptor)):
                 return descriptor

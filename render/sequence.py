@@ -8,11 +8,13 @@
 
 File names come from frame numbers and checked names, never from what a file says. Every file is
 renamed into place when it is complete, so that a file that exists is whole, and a command that was
-interrupted goes on where it stopped.
+interrupted goes on where it stopped. References, and what is kept of unfinished ones, cost hours
+and are on the disk before they get their names: no loss of power turns one into an empty file.
 """
 
 from __future__ import annotations
 
+import contextlib
 import io
 import re
 import zipfile
@@ -186,7 +188,7 @@ class Sequence:
         self._check(i)
         self._write(self._path("reference", i),
                     {"color": reference.color, "variance": reference.variance},
-                    {**(provenance or {}), "spp": str(reference.spp or _UNKNOWN)})
+                    {**(provenance or {}), "spp": str(reference.spp or _UNKNOWN)}, durable=True)
 
     def has_partial(self, i: int) -> bool:
         return self._path("reference", i, "partial.npz").exists()
@@ -213,7 +215,7 @@ class Sequence:
         # (A positional dictionary would be one pickled array.)
         np.savez(stream, allow_pickle=False,
                  **{name: np.asarray(array) for name, array in arrays.items()})
-        write_bytes(self._path("reference", i, "partial.npz"), stream.getvalue())
+        write_bytes(self._path("reference", i, "partial.npz"), stream.getvalue(), durable=True)
 
     def remove_partial(self, i: int) -> None:
         self._path("reference", i, "partial.npz").unlink(missing_ok=True)
@@ -244,6 +246,13 @@ class Sequence:
         """Remove a method's results and what they say about themselves."""
         remove_files(self.folder, self._result_folder(method))
 
+    def remove(self) -> None:
+        """Remove the whole sequence, and its folder if that holds nothing else."""
+        remove_sequence(self.folder)
+        (self.folder / "manifest.json").unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # not empty
+            self.folder.rmdir()
+
     def _check(self, i: int) -> None:
         if i not in self.manifest.frames:
             raise InputError(f"{self.folder} has no frame {i}: its frames are "
@@ -264,7 +273,7 @@ class Sequence:
         return {row.name: _joined([planes[c] for c in row.exr]) for row in rows}
 
     def _write(self, path: Path, images: Mapping[str, np.ndarray],
-               header: Mapping[str, str] | None) -> None:
+               header: Mapping[str, str] | None, durable: bool = False) -> None:
         planes = {}
         for name, image in images.items():
             row = CHANNELS[name]
@@ -276,7 +285,7 @@ class Sequence:
                 image = np.clip(image, -_HALF_MAX, _HALF_MAX)
             image = image.astype(np.float16 if row.half else np.float32)
             planes.update(zip(row.exr, np.moveaxis(np.atleast_3d(image), 2, 0)))
-        write_exr(path, planes, header)
+        write_exr(path, planes, header, durable)
 
     def _spp(self, path: Path) -> int | None:
         text = read_header(path).attributes.get("spp", "")

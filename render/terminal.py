@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import errno
+import os
 import shlex
 import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import NoReturn
+from contextlib import contextmanager, suppress
+from typing import Any, NoReturn, TextIO
 
 import click
 from rich.console import Console
@@ -104,6 +105,65 @@ def named_progress() -> Iterator[Callable[[int, int, str], None]]:
         yield report
 
 
+class _Output:
+    """A standard stream that lets a job go on when nobody reads it any more.
+
+    What a job is for are its files: that `head` has seen enough, or a log's disk is full, must not
+    end it halfway. What is written after that is dropped.
+
+    Args:
+        losses: errors that say so. Others are raised.
+    """
+
+    def __init__(self, stream: TextIO, losses: type[OSError]) -> None:
+        self._stream, self._losses = stream, losses
+
+    def write(self, text: str) -> int:
+        try:
+            return self._stream.write(text)
+        except self._losses:
+            self._drop()
+            return len(text)
+
+    def flush(self) -> None:
+        try:
+            self._stream.flush()
+        except self._losses:
+            self._drop()
+
+    def _drop(self) -> None:
+        """Lead the stream to nowhere; else Python complains of the rest when it ends."""
+        with suppress(OSError, ValueError), open(os.devnull, "w") as nowhere:
+            os.dup2(nowhere.fileno(), self._stream.fileno())
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+@contextmanager
+def _lasting_output() -> Iterator[None]:
+    """Standard output and error that are there and stay, whatever the caller has closed.
+
+    A file that is opened later must not get the number of a closed stream: libraries print there.
+    """
+    for descriptor in range(3):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free: this one
+    before = sys.stdout, sys.stderr
+    with open(os.devnull, "w") as nowhere:
+        sys.stdout = _Output(sys.stdout or nowhere, BrokenPipeError)
+        sys.stderr = _Output(sys.stderr or nowhere, OSError)
+        try:
+            yield
+        finally:
+            with suppress(OSError):  # told already, where it was written
+                sys.stdout.flush()
+            sys.stderr.flush()
+            sys.stdout, sys.stderr = before
+
+
 def run(command: click.Command, arguments: Sequence[str] | None = None,
         name: str = "onespp") -> None:
     """Run a command line and exit: 0 done, 2 bad input, 130 interrupted.
@@ -111,6 +171,11 @@ def run(command: click.Command, arguments: Sequence[str] | None = None,
     Ctrl-C and SIGTERM stop a job at its next step, and what was finished is kept. Errors that are
     not the user's keep their traceback: they are bugs.
     """
+    with _lasting_output():
+        _run(command, arguments, name)
+
+
+def _run(command: click.Command, arguments: Sequence[str] | None, name: str) -> None:
     from scenes.description import SceneError
 
     _Stop.asked = _Stop.at_once = False
@@ -130,9 +195,6 @@ def run(command: click.Command, arguments: Sequence[str] | None = None,
     except MemoryError:
         _stop("there is not enough memory: use a smaller --size, or fewer --channels; what was "
               "finished is kept")
-    except BrokenPipeError:
-        sys.stderr.close()  # the reader of our output has gone, as in `onespp ... | head`
-        sys.exit(0)
     except Exception as error:
         if _Stop.at_once:  # what an interrupt becomes inside an extension's import, say
             _interrupted()

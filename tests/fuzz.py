@@ -32,10 +32,10 @@ from test_command import SCENE
 
 from denoise.compare import comparison
 from denoise.cost import cost
-from denoise.interleave import read_times
 from denoise.report import render_page
 from denoise.score import measure_sequence
 from denoise.scorecard import read_scores
+from denoise.times import read_times
 from render import exr
 from render.errors import InputError
 from render.games202 import export_games202, import_games202, read_mat

@@ -12,6 +12,7 @@ import pytest
 from render import backend
 from render.arguments import parse_size
 from render.errors import InputError
+from render.trials import TRIALS, TrialError, attempt
 
 OLD = sorted(Path("/usr/lib").glob("*/libLLVM-1[0-5].so"))
 
@@ -66,8 +67,41 @@ def test_doctor_names_a_wrong_llvm_and_survives(tmp_path):
 def test_doctor_finds_everything_here():
     done = onespp("doctor")
     assert done.returncode == 0, done.stdout
-    for subject in ("Python", "LLVM", "CUDA", "threads", "kernel cache", "test kernel"):
-        assert subject in done.stdout
+    for subject in ("Python", "LLVM", "CUDA", "threads", "kernel cache", *TRIALS):
+        assert f" {subject}: " in done.stdout
+    for word in ("wrote and read a file", "rendered a pixel", "drew a plot", "read a video"):
+        assert word in done.stdout
+
+
+def spoiled(tmp_path, module: str, code: str) -> str:
+    """A folder for PYTHONPATH in which a library is what it should not be."""
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad" / f"{module}.py").write_text(code)
+    return str(tmp_path / "bad")
+
+
+@pytest.mark.parametrize(("module", "code", "words"), [
+    ("OpenEXR", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)",
+     "BAD   OpenEXR: crashed (SIGSEGV) where it was tried: run `"),
+    ("OpenEXR", "import ctypes; ctypes.string_at(8)", "BAD   OpenEXR: crashed (SIGSEGV)"),
+    ("matplotlib", "raise ImportError('no such symbol')",
+     "BAD   Matplotlib: ImportError: no such symbol"),
+    ("imageio_ffmpeg", "def get_ffmpeg_exe(): raise RuntimeError('none for this platform')",
+     "note  ffmpeg: RuntimeError: none for this platform; videos are left out")])
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals to die of")
+def test_doctor_survives_a_library_that_crashes_and_names_it(tmp_path, module, code, words):
+    done = onespp("doctor", PYTHONPATH=spoiled(tmp_path, module, code))
+    assert words in done.stdout, done.stdout + done.stderr
+    assert done.returncode == (2 if words.startswith("BAD") else 0)
+    assert "ok    test kernel: ran on" in done.stdout  # and the rest is looked at
+    assert "Traceback" not in done.stdout + done.stderr
+
+
+def test_a_library_that_hangs_is_not_waited_for(monkeypatch, tmp_path):
+    monkeypatch.setattr(sys, "path", [spoiled(tmp_path, "PIL", "import time; time.sleep(60)"),
+                                      *sys.path])
+    with pytest.raises(TrialError, match=r"did not come to an end in 3 s: run `.* pillow`"):
+        attempt("Pillow", 3)
 
 
 def test_the_llvm_in_use_is_new_enough():

@@ -11,10 +11,11 @@ import pytest
 from small_sequence import HEIGHT, WIDTH, small_sequence
 
 from denoise.cost import cost, startup
-from denoise.interleave import read_times, time_methods
+from denoise.interleave import time_methods
 from denoise.memory import PeakMemory
 from denoise.score import score
 from denoise.stream import denoise_sequence
+from denoise.times import read_times
 from render.errors import InputError
 from render.manifest import Run
 

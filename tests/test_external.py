@@ -25,6 +25,23 @@ for k in range(frames):
 '''
 
 
+# Writes a first result that is good and a second one that is not.
+SPOILED = """
+import sys
+from pathlib import Path
+import numpy as np
+from render.exr import read_exr, write_exr
+given, made = Path(sys.argv[1]), Path(sys.argv[2])
+for k in range(2):
+    planes, _ = read_exr(given / f"beauty_{k}.exr", ("R", "G", "B"))
+    write_exr(made / f"result_{k}.exr", {c: np.ones_like(p) for c, p in planes.items()})
+data = bytearray((made / "result_1.exr").read_bytes())
+data[-12:] = bytes(12)
+(made / "result_1.exr").write_bytes(data)
+print("a warning", file=sys.stderr)
+"""
+
+
 @pytest.fixture
 def sequence(tmp_path):
     return small_sequence(tmp_path / "a sequence")
@@ -63,7 +80,12 @@ def test_results_of_an_earlier_run_are_not_mixed_in(sequence, program):
 
 @pytest.mark.parametrize(("command", "words"), [
     (python("import sys; print('a\\nno such model', file=sys.stderr); sys.exit(3)"),
-     "failed with exit code 3, its last line was: no such model"),
+     "failed with exit code 3; its last words on stderr: a / no such model$"),
+    (python("print('out of luck'); raise SystemExit(3)"),
+     "failed with exit code 3; its last words on stdout: out of luck$"),
+    (python("import os, signal; os.kill(os.getpid(), signal.SIGKILL)"), "the signal SIGKILL"),
+    (python("print('nothing to do')"),
+     r"has no result_0\.exr.*; its last words on stdout: nothing to do$"),
     (python("import sys; sys.exit(4)"), "failed with exit code 4 and said nothing"),
     (python("pass"), r"has no result_0\.exr"),
     ("no-such-program-anywhere {input} {output}", "no-such-program-anywhere could not be started"),
@@ -74,6 +96,13 @@ def test_what_goes_wrong_is_one_sentence(sequence, command, words):
         denoise_externally(sequence, command, "mine")
     assert "\n" not in str(error.value)
     assert sequence.methods() == []
+
+
+def test_a_bad_result_is_one_sentence_and_leaves_none(sequence, program):
+    with pytest.raises(InputError, match="is damaged and cannot be decoded") as error:
+        denoise_externally(sequence, python(SPOILED), "mine")
+    assert "last words on stderr: a warning" in str(error.value)
+    assert not list((sequence.folder / "denoised").glob("mine/*"))
 
 
 def test_no_shell_reads_the_line(sequence, tmp_path):

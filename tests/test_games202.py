@@ -50,6 +50,36 @@ def projected(frame: Frame) -> np.ndarray:
     return position.astype(np.float64) @ frame.screen_from_world.T
 
 
+def test_an_export_that_fails_leaves_nothing(tmp_path):
+    """Missing: said before anything is written. Damaged: found by decoding, halfway."""
+    sequence = small_sequence(tmp_path / "a")
+    path = sequence.folder / "frames/0001.exr"
+    data = path.read_bytes()
+    path.unlink()
+    with pytest.raises(InputError, match="lacks frame 1: render all frames first"):
+        export_games202(sequence, tmp_path / "new/out")
+    assert not (tmp_path / "new").exists()
+    path.write_bytes(data[:-40] + bytes(40))
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/mine.txt").write_text("kept")
+    with pytest.raises(InputError, match=r"0001\.exr is damaged"):
+        export_games202(sequence, tmp_path / "out")
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["mine.txt"]
+
+
+def test_an_import_that_fails_halfway_leaves_nothing(tmp_path):
+    export_games202(small_sequence(tmp_path / "a"), tmp_path / "given")
+    path = tmp_path / "given/position_1.exr"
+    write_exr(path, dict.fromkeys("RGB", np.zeros((HEIGHT, WIDTH), np.float32)))
+    data = path.read_bytes()
+    path.write_bytes(data[:-12] + bytes(12))
+    with pytest.raises(InputError, match=r"position_1\.exr is damaged"):
+        import_games202(tmp_path / "given", tmp_path / "b")
+    assert not (tmp_path / "b").exists()
+    path.write_bytes(data)
+    assert import_games202(tmp_path / "given", tmp_path / "b").has_frame(1)
+
+
 def test_the_real_frames_survive_import_and_export_bit_for_bit(games202, tmp_path):
     sequence = import_games202(games202 / "input", tmp_path / "s")
     assert sequence.frames == [0, 1, 2, 3]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
+import stat
 import subprocess
 import sys
 import time
@@ -18,14 +20,14 @@ from small_sequence import contents, small_frame, small_manifest, small_sequence
 from denoise.report import write_report
 from denoise.score import measure_sequence
 from denoise.stream import _remove_stale
-from render import atomic, backend, doctor, job, memory
+from render import atomic, backend, doctor, job, lock, memory
 from render.errors import InputError
 from render.exr import read_exr
 from render.lock import writing
 from render.manifest import Run
 from render.reference import Progress
 from render.renderer import Renderer
-from render.sequence import Sequence
+from render.sequence import Reference, Sequence
 from scenes import catalog
 from scenes.description import SceneError
 
@@ -97,6 +99,72 @@ def test_the_lock_of_a_dead_process_is_taken_whatever_it_says(tmp_path):
 
 
 @posix
+@posix
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
+def test_a_file_system_without_locks_is_written_to(monkeypatch, tmp_path, number):
+    monkeypatch.setattr(lock.fcntl, "flock", raising(OSError(number, os.strerror(number))))
+    with writing(tmp_path / "a", "render"):
+        (tmp_path / "a/file").write_text("x")
+    assert (tmp_path / "a/file").exists()
+
+
+@posix
+@pytest.mark.parametrize("number", [errno.EIO, errno.EBADF, errno.EINVAL, errno.ESTALE])
+def test_a_lock_that_fails_otherwise_is_not_taken_for_one_that_is_held(monkeypatch, tmp_path,
+                                                                       number):
+    monkeypatch.setattr(lock.fcntl, "flock", raising(OSError(number, os.strerror(number))))
+    with pytest.raises(InputError, match=r"\.render\.lock could not be locked \(") as error, \
+            writing(tmp_path / "a", "render"):
+        pytest.fail("it was written to without a lock")
+    assert os.strerror(number) in str(error.value)
+
+
+def raising(error: Exception):
+    def act(*_: object) -> None:
+        raise error
+
+    return act
+
+
+def test_a_reference_is_on_the_disk_before_it_has_its_name(monkeypatch, tmp_path):
+    """It cost hours: a loss of power must not leave an empty file in its place."""
+    sequence, done = small_sequence(tmp_path), []
+    sync, replace = os.fsync, os.replace
+
+    def synced(descriptor: int) -> None:
+        done.append("folder" if stat.S_ISDIR(os.fstat(descriptor).st_mode) else "file")
+        sync(descriptor)
+
+    def replaced(source, target) -> None:
+        done.append(Path(target).name)
+        replace(source, target)
+
+    monkeypatch.setattr(atomic.os, "fsync", synced)
+    monkeypatch.setattr(atomic.os, "replace", replaced)
+    color = np.ones((*sequence.size, 3), np.float32)
+    after = ["folder"] if os.name != "nt" else []
+    sequence.write_reference(0, Reference(color, color, 16))
+    assert done == ["file", "0000.exr", *after]
+    done.clear()
+    sequence.write_partial(0, {"samples": 1})
+    assert done == ["file", "0000.partial.npz", *after]
+    done.clear()
+    sequence.write_result("m", 0, color)  # made again in a second: not worth the wait
+    assert done == ["0000.exr"]
+
+
+@pytest.mark.parametrize(("number", "fine"), [(errno.EINVAL, True), (errno.EIO, False)])
+def test_a_disk_that_cannot_sync_is_used_and_one_that_fails_is_told_of(monkeypatch, tmp_path,
+                                                                       number, fine):
+    monkeypatch.setattr(atomic.os, "fsync", raising(OSError(number, os.strerror(number))))
+    if fine:
+        atomic.write_bytes(tmp_path / "a", b"x", durable=True)
+    else:
+        with pytest.raises(InputError, match="could not be written"):
+            atomic.write_bytes(tmp_path / "a", b"x", durable=True)
+    assert (tmp_path / "a").exists() == fine
+
+
 def test_commands_take_the_lock(call, scene_file, tmp_path):
     out = tmp_path / "a"
     with writing(out, "render"):
@@ -335,7 +403,7 @@ def test_a_small_scene_renders_in_an_odd_environment_and_512_mb(tmp_path, scene_
 
 
 def test_an_empty_llvm_path_counts_as_none(tmp_path):
-    code = ("import render, os; from render import backend; print(backend._SET_BY_USER, "
+    code = ("import render, drjit, os; from render import backend; print(backend._SET_BY_USER, "
             "bool(os.environ['DRJIT_LIBLLVM_PATH']))")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
                           env={**os.environ, "DRJIT_LIBLLVM_PATH": ""},

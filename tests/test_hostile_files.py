@@ -64,6 +64,33 @@ def test_an_image_cut_off_anywhere_is_noticed_before_the_library_complains(exr, 
     assert capfd.readouterr().err == ""
 
 
+def test_damage_inside_a_chunk_is_one_sentence_and_prints_nothing_into_our_output(tmp_path, capsys):
+    """The library tells of it by `print`, which would land in the middle of a table."""
+    path = tmp_path / "a.exr"
+    write_exr(path, {"Z": np.add.outer(np.arange(64), np.arange(40)).astype(np.float32)})
+    data = bytearray(path.read_bytes())
+    data[-60:-40] = bytes(20)
+    path.write_bytes(data)
+    stdout = sys.stdout
+    assert "a.exr is damaged and cannot be decoded" in sentence(read_exr, path)
+    assert sys.stdout is stdout
+    assert capsys.readouterr().out == ""
+
+
+def test_an_image_for_which_there_is_no_memory_is_not_called_damaged(tmp_path):
+    if not Path("/proc/self/statm").exists():
+        pytest.skip("the memory of a process can be limited on Linux alone")
+    path, size = tmp_path / "a.exr", 6000
+    write_exr(path, {"Z": np.zeros((size, size), np.float32)})
+    code = ("import resource, sys, pathlib; from render.exr import read_exr, _threads; _threads(); "
+            "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize(); "
+            f"resource.setrlimit(resource.RLIMIT_AS, (used + {2 * size * size},) * 2); "
+            "read_exr(pathlib.Path(sys.argv[1]))")
+    run = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True,
+                         cwd=Path(__file__).parents[1])
+    assert run.stderr.splitlines()[-1].startswith("MemoryError"), run.stderr
+
+
 def test_a_channel_of_an_unknown_type_is_named(exr):
     data = exr.read_bytes()
     assert data.count(b"G\0\2\0\0\0") == 1

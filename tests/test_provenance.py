@@ -13,11 +13,11 @@ import pytest
 from made_sequence import COUNT, METHODS, make_sequence
 from small_sequence import small_manifest
 
-from denoise.interleave import MethodTime, Times, read_times
 from denoise.provenance import commands, provenance
 from denoise.report import write_report
 from denoise.score import score
 from denoise.scorecard import read_scores
+from denoise.times import MethodTime, Times, read_times
 from render.json_file import format_json
 from render.machine import machine
 from render.sequence import Sequence

@@ -1,0 +1,60 @@
+"""What a frame's matrices say about its view and its objects' motion, in NumPy alone.
+
+Symbols: u = (x + 1/2, y + 1/2, 1) a pixel's centre on the screen; B = camera_from_screen (3x3);
+M and M' world_from_object of an object, now and in the frame before.
+
+Apart from the kernels, so that scores, which need no Dr.Jit, do not load it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from render.errors import InputError
+from render.frame import Frame
+
+
+def camera_from_screen(frame: Frame) -> np.ndarray:
+    """B: (3, 3) float64 that maps a pixel's u to its camera-space position at depth 1.
+
+    Raises:
+        InputError: the frame's matrices are not those of a pinhole camera.
+    """
+    try:
+        return np.linalg.inv(screen_from_camera(frame))
+    except np.linalg.LinAlgError:
+        raise InputError(f"the matrices of frame {frame.index} do not project to a screen: "
+                         "screen_from_world is singular") from None
+
+
+def screen_from_camera(frame: Frame) -> np.ndarray:
+    """B^-1, (3, 3) float64: rows x, y and depth of u.
+
+    A pinhole at the camera's origin has no fourth column.
+    """
+    try:
+        world_from_camera = np.linalg.inv(frame.camera_from_world)
+    except np.linalg.LinAlgError:
+        raise InputError(f"camera_from_world of frame {frame.index} is singular") from None
+    return (frame.screen_from_world @ world_from_camera)[[0, 1, 3], :3]
+
+
+def world_motions(previous: Frame, current: Frame) -> np.ndarray:
+    """(objects, 4, 4) M' M^-1, exactly the identity for an object at rest; NaN for one that only
+    one of the frames has, or whose M has changed and cannot be inverted."""
+    before = np.full(current.world_from_object.shape, np.nan)
+    count = min(len(before), len(previous.world_from_object))
+    before[:count] = previous.world_from_object[:count]
+    motion = before @ inverses(current.world_from_object)
+    motion[(before == current.world_from_object).all((1, 2))] = np.eye(4)
+    return motion
+
+
+def inverses(matrices: np.ndarray) -> np.ndarray:
+    """(n, k, k) inverses, NaN where there is none."""
+    try:
+        return np.linalg.inv(matrices)
+    except np.linalg.LinAlgError:
+        if len(matrices) == 1:
+            return np.full(matrices.shape, np.nan)
+        return np.concatenate([inverses(matrix[None]) for matrix in matrices])

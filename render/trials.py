@@ -1,0 +1,212 @@
+"""Each library that work depends on, tried on the smallest thing that we use it for.
+
+A library may end the process that calls it, or never return, so every trial runs in a process of
+its own, and what becomes of that is told in a sentence. Imported by `doctor` alone.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+SECONDS = 120  # a machine under load compiles its first kernel in 10
+
+
+class TrialError(Exception):
+    """What a library did wrong, as the end of a sentence that begins with its name."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A library's trial.
+
+    Attributes:
+        run: does something in an empty folder and says what, in a few words.
+        package: what pip calls it.
+        without: what is lost where it fails; "" where nothing goes on.
+    """
+
+    run: Callable[[Path], str]
+    package: str
+    without: str = ""
+
+
+def _openexr(folder: Path) -> str:
+    from .exr import read_exr, write_exr
+
+    image = np.linspace(0, 1, 64 * 48, dtype=np.float32).reshape(48, 64)
+    for _ in range(8):  # threads that race need some tries
+        write_exr(folder / "a.exr", {"Z": image, "half": image.astype(np.float16)})
+        back, _ = read_exr(folder / "a.exr")
+        _expect(np.array_equal(back["Z"], image), "read another image than it wrote")
+    return "wrote and read a file"
+
+
+def _pillow(folder: Path) -> str:
+    from PIL import Image, ImageDraw, ImageFont
+
+    image = Image.new("RGB", (64, 48))
+    ImageDraw.Draw(image).text((2, 2), "0", font=ImageFont.load_default(size=20))
+    image.save(folder / "a.png")
+    _expect(np.array_equal(np.asarray(Image.open(folder / "a.png")), np.asarray(image)),
+            "read another image than it wrote")
+    return "wrote and read a file"
+
+
+def _matplotlib(folder: Path) -> str:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(1, 1))
+    figure.add_subplot().plot([0, 1])
+    FigureCanvasAgg(figure).print_png(folder / "a.png")
+    _expect((folder / "a.png").read_bytes()[1:4] == b"PNG", "wrote no picture")
+    return "drew a plot"
+
+
+def _flip(folder: Path) -> str:
+    import flip_evaluator
+
+    image = np.full((16, 16, 3), 0.5, np.float32)
+    _, mean, _ = flip_evaluator.evaluate(image, image, "LDR", True, False, True, {})
+    _expect(mean == 0, f"says that equal images differ by {mean}")
+    return "compared two images"
+
+
+def _kernel(folder: Path) -> str:
+    from . import backend
+
+    device = backend.choose()
+    import drjit as dr
+
+    module = {"llvm": dr.llvm, "cuda": dr.cuda}[device]
+    total = dr.sum(module.Float(dr.arange(module.UInt32, 1000)))[0]
+    _expect(total == 499500, f"computed a wrong sum on {device}: {total}")
+    count = dr.thread_count()
+    return f"ran on {device}, {count} thread{'s' * (count != 1)}"
+
+
+def _mitsuba(folder: Path) -> str:
+    from .variant import mi
+
+    scene = mi.load_dict({
+        "type": "scene", "integrator": {"type": "path"}, "light": {"type": "constant"},
+        "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 1, "height": 1},
+                   "sampler": {"type": "independent"}}})
+    mi.Bitmap(mi.render(scene, spp=1)).write(str(folder / "a.exr"))
+    pixel = np.array(mi.Bitmap(str(folder / "a.exr")))[0, 0, :3]
+    _expect(np.allclose(pixel, 1, atol=1e-3), f"rendered {pixel} in place of white")
+    return f"rendered a pixel ({mi.variant()})"
+
+
+def _ffmpeg(folder: Path) -> str:
+    import imageio_ffmpeg
+
+    program = imageio_ffmpeg.get_ffmpeg_exe()
+    path = folder / "a.mp4"
+    done = subprocess.run(
+        [program, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
+         "-s", "64x48", "-r", "24", "-i", "-", "-c:v", "libx264", "-pix_fmt", "yuv420p", str(path)],
+        input=bytes(2 * 64 * 48 * 3), capture_output=True, check=False)
+    _expect(done.returncode == 0 and path.exists(),
+            f"made no video: {_last(done.stderr) or f'exit code {done.returncode}'}")
+    frames, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
+    _expect(frames == 2, f"read {frames} frames of a video of 2")
+    return f"wrote and read a video ({program})"
+
+
+def _oidn(folder: Path) -> str:
+    import pyoidn
+
+    device = pyoidn.Device()
+    device.commit()
+    images = {name: np.ones((16, 16, 3), np.float32) for name in ("color", "output")}
+    images["output"][:] = 0
+    network = pyoidn.Filter(device, pyoidn.OIDN_FILTER_TYPE_RT)
+    for name, image in images.items():
+        network.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
+    network.commit()
+    network.execute()
+    error = device.get_error()
+    _expect(not error, str(error))
+    _expect(np.allclose(images["output"], 1, atol=0.1), "made a white image another")
+    network.release()
+    device.release()
+    return "denoised an image"
+
+
+TRIALS: dict[str, Trial] = {
+    "OpenEXR": Trial(_openexr, "OpenEXR"),
+    "test kernel": Trial(_kernel, "drjit"),
+    "Mitsuba": Trial(_mitsuba, "mitsuba"),
+    "Pillow": Trial(_pillow, "pillow"),
+    "Matplotlib": Trial(_matplotlib, "matplotlib"),
+    "FLIP": Trial(_flip, "flip-evaluator", "there are no FLIP scores"),
+    "ffmpeg": Trial(_ffmpeg, "imageio-ffmpeg", "videos are left out"),
+    "Open Image Denoise": Trial(_oidn, "pyoidn", "there are no OIDN rows in tables"),
+}
+
+
+def attempt(name: str, seconds: float = SECONDS) -> str:
+    """What a library did in a process of its own.
+
+    Raises:
+        TrialError: what it did wrong, and what to do.
+    """
+    package = TRIALS[name].package
+    again = f"run `{sys.executable} -m pip install --force-reinstall {package}`"
+    with tempfile.TemporaryDirectory(prefix="onespp-") as folder:
+        try:
+            done = subprocess.run(
+                [sys.executable, "-m", __name__, name, folder], stdin=subprocess.DEVNULL,
+                capture_output=True, timeout=seconds, check=False,
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path)),
+                     "PYTHONIOENCODING": "utf-8"})
+        except subprocess.TimeoutExpired:
+            raise TrialError(f"did not come to an end in {seconds:g} s: {again}") from None
+    if done.returncode == 0:
+        return _last(done.stdout)
+    if done.returncode < 0:
+        try:
+            how = signal.Signals(-done.returncode).name
+        except ValueError:
+            how = str(-done.returncode)
+        raise TrialError(f"crashed ({how}) where it was tried: {again}, or use another version of "
+                         f"Python than {sys.version.split()[0]}")
+    raise TrialError(_last(done.stderr) or f"ended with exit code {done.returncode}: {again}")
+
+
+def _expect(holds: object, otherwise: str) -> None:
+    if not holds:
+        raise TrialError(otherwise)
+
+
+def _last(output: bytes) -> str:
+    """The last line of a process's output, made fit for a line of ours."""
+    lines = [line for line in output.decode(errors="replace").splitlines() if line.strip()]
+    return "".join(c if c.isprintable() else "?" for c in lines[-1].strip())[:300] if lines else ""
+
+
+def main() -> None:
+    """Run one trial here: its name and an empty folder are the arguments."""
+    name, folder = sys.argv[1:]
+    from .errors import InputError
+
+    try:
+        print(TRIALS[name].run(Path(folder)))
+    except (TrialError, InputError) as error:
+        sys.exit(str(error))
+    except Exception as error:
+        sys.exit(f"{type(error).__name__}: {error}")
+
+
+if __name__ == "__main__":
+    main()
