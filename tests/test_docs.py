@@ -37,7 +37,7 @@ from render.errors import InputError
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PAGES = {path.name: path for path in (ROOT / "README.md", *sorted(DOCS.glob("*.md")))}
-pytestmark = pytest.mark.filterwarnings("ignore:.*MystReferenceResolver:DeprecationWarning")
+pytestmark = pytest.mark.filterwarnings("ignore:.*MystReferenceResolver")
 
 BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.M | re.S)
 CODE = re.compile(r"`([^`\n]+)`")
