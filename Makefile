@@ -5,7 +5,7 @@ ifeq ($(OS),Windows_NT)
 BIN := .venv/Scripts
 endif
 
-.PHONY: demo test lint slow docs results clean
+.PHONY: demo test pythons lint slow docs results clean
 
 demo: .venv/installed
 	$(BIN)/onespp run box --frames 0:8 --size 192x192 --reference-spp 256 --out data/demo \
@@ -14,6 +14,9 @@ demo: .venv/installed
 
 test: .venv/installed-dev lint
 	$(BIN)/python -m pytest
+
+pythons: .venv/installed-dev
+	$(BIN)/python .ci/pythons.py
 
 lint: .venv/installed-dev
 	$(BIN)/ruff check .

@@ -27,7 +27,6 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
-import OpenEXR
 
 from .atomic import read_bytes, write_bytes
 from .errors import InputError
@@ -67,6 +66,8 @@ def write_exr(path: Path, channels: Mapping[str, np.ndarray],
     Raises:
         InputError: shapes or types that cannot be stored, or the disk refuses.
     """
+    import OpenEXR
+
     shapes = {image.shape for image in channels.values()}
     if len(shapes) != 1 or len(next(iter(shapes))) != 2 or 0 in next(iter(shapes)):
         raise InputError(f"{path} could not be written because its channels have the shapes "
@@ -120,6 +121,8 @@ def read_header(path: Path) -> Header:
 
 def _decode(path: Path, data: bytes, header: Header, names: list[str]) -> dict[str, np.ndarray]:
     """name -> read-only pixels of a file that `_check` has passed."""
+    import OpenEXR
+
     stream = io.BytesIO(data)
     with _unprinted() as said:
         try:
@@ -177,6 +180,8 @@ def _unprinted() -> Iterator[list[str]]:
 @cache
 def _threads() -> int:
     """Lets the library use the machine's cores (it starts with one); the number of them."""
+    import OpenEXR  # not before it is used, so that `doctor` can tell of one that crashes
+
     count = min(os.cpu_count() or 1, 16)
     OpenEXR.set_global_thread_count(count)
     return count
