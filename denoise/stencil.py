@@ -337,6 +337,11 @@ def _listed(*planes: Float) -> list[Float]:
     return list(planes)
 
 
+def single(plane: Float) -> Float:
+    """For `Taps.named`, of taps of one plane."""
+    return plane
+
+
 class Step(Generic[P, R]):
     """A function of structures of Dr.Jit arrays and taps, recorded at its first call and replayed
     after that.
