@@ -167,9 +167,14 @@ class Stencil:
             words += list(dr.gather(self.ArrayXf, packed, at, shape=(_GATHERED, self.lanes)))
         return words[:count]
 
-    def rows_around(self, arrays: Sequence[Float], margin: int) -> Taps[list[Float]]:
+    def rows_around(self, values: Any, margin: int) -> Taps[list[Float]]:
         """A kernel's results, evaluated over `margin` rows more on either side, seen from the
-        2 margin + 1 rows around each pixel: taps without a copy."""
+        2 margin + 1 rows around each pixel: taps without a copy.
+
+        Args:
+            values: a structure of arrays (`structure.py`), depth first.
+        """
+        arrays = arrays_of(values)
         starts = [row * self.stride for row in range(2 * margin + 1)]
         if self.layout == "gather":
             return self.gathers(arrays, starts, self.lanes)
