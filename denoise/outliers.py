@@ -1,7 +1,7 @@
 """Outlier removal before the filter: a stage that any method can follow.
 
-Symbols: C a signal without texture, one channel; mu, sigma its mean and deviation over the pixels
-around that lie on the same surface (same object, near the tangent plane), itself left out;
+Symbols: C a signal without texture, one channel; mu, sigma its mean and standard deviation over the
+pixels around that lie on the same surface (same object, near the tangent plane), itself left out;
 k = outlier_width.
 
     C <- clamp(C, mu - k sigma, mu + k sigma)
@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import numpy as np
@@ -35,10 +35,17 @@ from .luminance import luminance
 from .parameters import check_positive, check_whole
 from .stencil import Offset, Planes, Stencil, Step, Taps, window
 from .structure import evaluate
-from .surface import GUIDES, check_size, read_surface, repair
+from .surface import GUIDES, TangentPlane, check_size, read_surface, repair
 
 FEWEST = 4
 _PARTS = ("direct", "indirect", "specular")
+
+
+class SurfaceTap(NamedTuple):
+    """What tells whether a pixel lies on the same surface: object ID and 1/z."""
+
+    id: Float
+    inverse_depth: Float
 
 
 @dataclass(frozen=True)
@@ -46,7 +53,7 @@ class RemoveOutliers:
     """The stage.
 
     Attributes:
-        outlier_width: k, in deviations. outlier_radius: of the window, 1 to 8 pixels.
+        outlier_width: k, in standard deviations. outlier_radius: of the window, 1 to 8 pixels.
         outlier_plane: distance from the tangent plane over depth within which a pixel counts.
     """
 
@@ -63,7 +70,8 @@ class RemoveOutliers:
         stencil = Stencil(height, width, self.outlier_radius)
         signal, guides = stencil.planes([0.0] * 3), stencil.planes([-2.0, 0.0])
         offsets = window(self.outlier_radius)
-        return OutlierState(stencil, signal, guides, signal.taps(offsets), guides.taps(offsets),
+        return OutlierState(stencil, signal, guides, signal.taps(offsets).named(Color),
+                            guides.taps(offsets).named(SurfaceTap),
                             Step(lambda *a: clamp(offsets, *a)))
 
     def __call__(self, frame: Frame, state: OutlierState) -> tuple[Frame, OutlierState]:
@@ -77,18 +85,19 @@ class RemoveOutliers:
         surface = read_surface(frame, stencil)
         scale = dr.select(surface.is_valid, dr.abs(surface.plane_distance)
                           * stencil.opaque(1 / self.outlier_plane), 1)
-        guides = [stencil.Float(surface.id), surface.inverse_depth, *surface.slope, scale]
-        evaluate(guides)
-        state.guides.store(guides[:2])
-        width = [stencil.opaque(self.outlier_width)]
+        id_ = stencil.Float(surface.id)
+        plane = TangentPlane(surface.inverse_depth, *surface.slope, scale)
+        evaluate(id_, plane)
+        state.guides.store(SurfaceTap(id_, plane.inverse_depth))
+        width = stencil.opaque(self.outlier_width)
         before = repair(np.asarray(frame["color"], np.float32), frame["id"])
         images, color = {}, before
         for name, given, texture in _lights(frame, before, stencil):
             light = texture.demodulate(Color(*stencil.load(given)))
             evaluate(light)
             state.signal.store(light)
-            light = state.clamp(state.signal_taps, state.guide_taps, light, guides, width)
-            images[name] = stencil.image(texture.modulate(Color(*light)))
+            light = state.clamp(state.signal_taps, state.guide_taps, light, id_, plane, width)
+            images[name] = stencil.image(texture.modulate(light))
             color = color + (images[name] - given)
         if "specular" in images:
             images["indirect"] = images["indirect"] + images["specular"]
@@ -110,9 +119,9 @@ class OutlierState:
     stencil: Stencil
     signal: Planes
     guides: Planes
-    signal_taps: Taps
-    guide_taps: Taps
-    clamp: Step[..., Any]
+    signal_taps: Taps[Color]
+    guide_taps: Taps[SurfaceTap]
+    clamp: Step[..., Color]
     before: float = 0.0
     after: float = 0.0
 
@@ -134,16 +143,19 @@ def _lights(frame: Frame, color: np.ndarray,
     yield "indirect", parts["indirect"], plain
 
 
-def clamp(offsets: list[Offset], signal: Taps, guides: Taps, center: list[Float],
-          center_guides: list[Float], width: list[Float]) -> list[Float]:
-    """Each channel within mu -+ k sigma of the window's pixels on the same surface."""
-    id_, inverse_depth, gx, gy, scale = center_guides
-    float_t = type(inverse_depth)
+def clamp(offsets: list[Offset], signal: Taps[Color], guides: Taps[SurfaceTap], center: Color,
+          id_: Float, plane: TangentPlane, width: Float) -> Color:
+    """Each channel within mu -+ k sigma of the window's pixels on the same surface.
+
+    Args:
+        center, id_, plane: of the pixel itself. width: k.
+    """
+    float_t = type(plane.inverse_depth)
     count, sums, squares = float_t(0), [float_t(0)] * 3, [float_t(0)] * 3
     for i, (dy, dx) in enumerate(offsets):
-        tap_id, tap_inverse_depth = guides.at(i)
-        expected = dr.fma(gx, float(dx), dr.fma(gy, float(dy), inverse_depth))
-        alike = (tap_id == id_) & (dr.abs(tap_inverse_depth - expected) * scale < 1)
+        tap = guides.at(i)
+        expected = dr.fma(plane.dx, float(dx), dr.fma(plane.dy, float(dy), plane.inverse_depth))
+        alike = (tap.id == id_) & (dr.abs(tap.inverse_depth - expected) * plane.scale < 1)
         count += dr.select(alike, float_t(1), 0)
         for c, value in enumerate(signal.at(i)):
             value = dr.select(alike, value, 0)
@@ -154,11 +166,11 @@ def clamp(offsets: list[Offset], signal: Taps, guides: Taps, center: list[Float]
     for value, total, square in zip(center, sums, squares, strict=True):
         mean = total / count
         variance = dr.fma(-mean, mean, square / count)
-        reach = width[0] * dr.sqrt(dr.select(variance > 0, variance, 0))
+        reach = width * dr.sqrt(dr.select(variance > 0, variance, 0))
         low, high = mean - reach, mean + reach
         clamped = dr.select(value < low, low, dr.select(value > high, high, value))
         result.append(dr.select(count >= FEWEST, clamped, value))
-    return result
+    return Color(*result)
 
 
 @dataclass(frozen=True)
