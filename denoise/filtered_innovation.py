@@ -62,7 +62,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class FilteredInnovation(OnLanes):
+class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     """The filtered innovation of visibility, glossy and diffuse light.
 
     Attributes:
@@ -131,11 +131,11 @@ class FilteredInnovation(OnLanes):
     def reach(self) -> int:
         return 1 << max(self.innovation_levels - 1, self.output_levels - 1, SPREAD_LEVEL)
 
-    def init_on(self, stencil: Stencil) -> RecordState:
+    def init_on(self, stencil: Stencil) -> RecordState[Passes]:
         return RecordState(stencil, no_history(stencil))
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,
-                 state: RecordState) -> tuple[Color, RecordState]:
+                 state: RecordState[Passes]) -> tuple[Color, RecordState[Passes]]:
         """`color` is used where the frame has no direct and indirect light."""
         stencil, previous, sample = state.stencil, state.previous or frame, surface.sample
         motion = motion_between(previous, frame, stencil)
