@@ -17,6 +17,7 @@ A kernel's results are fresh arrays, one number a lane. `Planes.store` copies th
 scatter would cost five times as much, and in a frozen function it silently writes to a copy.
 """
 
+# pyright: standard
 from __future__ import annotations
 
 import gc
@@ -365,7 +366,7 @@ class Step(Generic[P, R]):
             return results.arrays
 
         self._call = call
-        self._frozen = dr.freeze(record, state_fn=lambda *_: call.form, warn_after=1000)
+        self._frozen: Any = dr.freeze(record, state_fn=lambda *_: call.form, warn_after=1000)
 
     def __call__(self, *arguments: P.args, **_: P.kwargs) -> R:
         call = self._call
