@@ -43,6 +43,7 @@ Our own, from a trial; the nearest published relatives are the fast and slow his
 the gradients of A-SVGF (Schied et al. 2018).
 """
 
+# pyright: standard
 from __future__ import annotations
 
 import math
@@ -278,7 +279,8 @@ def _choose_history(found: Innovations, shadow: ShadowInnovation,
                     smoothed: Smoothed) -> tuple[Innovations, Smoothed]:
     """With the shadow history of visibility in the place of the other one, where it is better."""
     excess, energy, shadow_wide = smoothed.excess, smoothed.energies[-1], smoothed.shadow_innovation
-    assert excess is not None and shadow_wide is not None
+    assert excess is not None
+    assert shadow_wide is not None
     better = excess < 0
     e, wide = found.signals[-1], smoothed.sharp[-1]
     e = e._replace(luminance=dr.select(better, shadow.innovation, e.luminance))

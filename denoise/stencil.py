@@ -17,6 +17,7 @@ A kernel's results are fresh arrays, one number a lane. `Planes.store` copies th
 scatter would cost five times as much, and in a frozen function it silently writes to a copy.
 """
 
+# pyright: standard
 from __future__ import annotations
 
 import gc
@@ -371,21 +372,22 @@ class Step(Generic[P, R]):
             seen = [a.seen_as(b) for a, b in zip(call.taps, taps, strict=True)]
             arguments = build(call.form, arrays, seen)
             results = flatten(traced(*arguments))
-            call.results[call.form] = results.form
+            call.results[call.number] = results.form
             return results.arrays
 
         self._call = call
-        self._frozen = dr.freeze(record, state_fn=lambda *_: call.form, warn_after=1000)
+        self._frozen: Any = dr.freeze(record, state_fn=lambda *_: call.number, warn_after=1000)
 
     def __call__(self, *arguments: P.args, **_: P.kwargs) -> R:
         call = self._call
         call.form, arrays, call.taps = flatten(arguments)
+        call.number = call.numbers.setdefault(call.form, len(call.numbers))
         try:
             with _no_collection():
                 results = self._frozen(arrays, [taps.arrays for taps in call.taps])
         finally:
             call.taps = []
-        return build(call.results[call.form], results)
+        return build(call.results[call.number], results)
 
     @property
     def recordings(self) -> int:
@@ -393,14 +395,17 @@ class Step(Generic[P, R]):
 
 
 class _Call:
-    """The call that is being made: its taps and form; and the form of the results by the form of
-    the arguments. Dr.Jit walks all that a recorded function's closure holds, at every call, but not
-    into an object such as this."""
+    """The call that is being made: its taps, its form, and the number of that among the forms seen,
+    for Dr.Jit walks what tells recordings apart; and the form of the results, by that number.
+    Dr.Jit walks all that a recorded function's closure holds, at every call, but not into an object
+    such as this."""
 
     def __init__(self) -> None:
         self.taps: list[Taps] = []
         self.form: Form = ()
-        self.results: dict[Form, Form] = {}
+        self.number = 0
+        self.numbers: dict[Form, int] = {}
+        self.results: dict[int, Form] = {}
 
 
 @contextmanager
