@@ -17,6 +17,8 @@ Schied et al. 2018; the power of 10 from Quake II RTX.
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import or_
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -24,7 +26,7 @@ import drjit as dr
 from .arrays import Float
 from .atrous import LuminanceColor
 from .exponential import exp2
-from .history import look_up, pack_records
+from .history import look_up
 from .reprojection import Motion, ReprojectionTests, locate
 from .sparse import tabulate, weighted_sums, window_taps
 from .stencil import Stencil
@@ -73,7 +75,8 @@ def accumulate(stencil: Stencil, fallback: bool, signals: list[LuminanceColor],
     """Blend with the history.
 
     Args:
-        motion: of `reprojection.motion_between`. records: of `pack_accumulated`.
+        motion: of `reprojection.motion_between`. records: of what this gave for the frame before, or
+            of it with other colours (`history.pack_records`).
         changes: lambda of each signal, which then has a length of its own; or none.
     """
     place = locate(stencil, surface, motion, tests.plane_tolerance)
@@ -102,11 +105,6 @@ def accumulate(stencil: Stencil, fallback: bool, signals: list[LuminanceColor],
     return Accumulated(lengths, blended)
 
 
-def pack_accumulated(stencil: Stencil, surface: SurfaceSample, accumulated: Accumulated) -> Float:
-    """Records of a frame."""
-    return pack_records(stencil, surface, accumulated)
-
-
 def _accumulated(values: list[Float], lengths: int) -> Accumulated:
     """Of the values of a record."""
     size = _COLOR + _MOMENTS
@@ -122,18 +120,19 @@ def tabulate_moments(stencil: Stencil, accumulated: Accumulated, guides: Guides)
 
 
 def estimate_variances(stencil: Stencil, accumulated: Accumulated, geometry: Geometry,
-                       table: Float, enough: Float, half_power: Float) -> list[Float]:
+                       window_table: Float, min_temporal_length: Float,
+                       half_power: Float) -> list[Float]:
     """v of each signal.
 
     Args:
-        table: of `tabulate_moments`. enough: length from which on history gives the variance.
+        window_table: of `tabulate_moments`.
+        min_temporal_length: from which on history gives the variance, not the window.
         half_power: of `wavelet.LevelWeights`.
     """
     lengths, signals = accumulated
-    active = lengths[0] < enough
-    for h in lengths[1:]:
-        active |= h < enough
-    count, around = _MOMENTS * len(signals), window_taps(stencil, RADIUS, table)
+    is_short = [h < min_temporal_length for h in lengths]
+    active = reduce(or_, is_short)
+    count, around = _MOMENTS * len(signals), window_taps(stencil, RADIUS, window_table)
     tolerance = geometry.tolerance
 
     def tap(i: Any) -> tuple[Float, list[Float]]:
@@ -145,15 +144,11 @@ def estimate_variances(stencil: Stencil, accumulated: Accumulated, geometry: Geo
 
     total, sums = weighted_sums(stencil, active, (2 * RADIUS + 1)**2, count, tap)
     norm = dr.select(active, 1 / dr.select(active, total, 1), 0)
-    around_each = [Moments(*sums[i:i + _MOMENTS]) for i in range(0, count, _MOMENTS)]
-    return [_variance(signal.moments, around, norm, lengths[min(s, len(lengths) - 1)], enough)
-            for s, (signal, around) in enumerate(zip(signals, around_each, strict=True))]
-
-
-def _variance(moments: Moments, sums: Moments, norm: Float, length: Float,
-              enough: Float) -> Float:
-    """v of a signal; sums over the window, times norm, in the place of the moments of a short
-    history."""
-    m1, m2 = (dr.select(length < enough, a * norm, m) for a, m in zip(sums, moments))
-    v = dr.fma(-m1, m1, m2)
-    return dr.select(v > 0, v, 0) * dr.maximum(1, SHORT / length)
+    variances = []
+    for s, signal in enumerate(signals):
+        of = min(s, len(lengths) - 1)
+        window = Moments(*sums[_MOMENTS * s:_MOMENTS * (s + 1)])
+        m1, m2 = (dr.select(is_short[of], w * norm, m) for w, m in zip(window, signal.moments))
+        v = dr.fma(-m1, m1, m2)
+        variances.append(dr.select(v > 0, v, 0) * dr.maximum(1, SHORT / lengths[of]))
+    return variances

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 import drjit as dr
 import numpy as np
@@ -173,11 +173,25 @@ def clamp(offsets: list[Offset], signal: Taps[Color], guides: Taps[SurfaceTap], 
     return Color(*result)
 
 
+S = TypeVar("S")
+
+
+class _Method(Protocol[S]):
+    """What `methods.Method` says, with its state's type."""
+
+    @property
+    def needs(self) -> tuple[str, ...]: ...
+
+    def init(self, height: int, width: int) -> S: ...
+
+    def __call__(self, frame: Frame, state: S) -> tuple[np.ndarray, S]: ...
+
+
 @dataclass(frozen=True)
-class WithoutOutliers:
+class WithoutOutliers(Generic[S]):
     """A method that is given frames without outliers."""
 
-    method: Any
+    method: _Method[S]
     outliers: RemoveOutliers = field(default_factory=RemoveOutliers)
 
     @property
@@ -188,21 +202,21 @@ class WithoutOutliers:
     def uses(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys((*_PARTS, *getattr(self.method, "uses", ()))))
 
-    def init(self, height: int, width: int) -> Cleaned:
+    def init(self, height: int, width: int) -> Cleaned[S]:
         return Cleaned(self.outliers.init(height, width), self.method.init(height, width))
 
-    def __call__(self, frame: Frame, state: Cleaned) -> tuple[np.ndarray, Cleaned]:
+    def __call__(self, frame: Frame, state: Cleaned[S]) -> tuple[np.ndarray, Cleaned[S]]:
         frame, outliers = self.outliers(frame, state.outliers)
         image, inner = self.method(frame, state.inner)
         return image, Cleaned(outliers, inner)
 
 
 @dataclass(frozen=True)
-class Cleaned:
+class Cleaned(Generic[S]):
     """State of the stage and of the method after it."""
 
     outliers: OutlierState
-    inner: Any
+    inner: S
 
     @property
     def energy_kept(self) -> float:
@@ -210,6 +224,6 @@ class Cleaned:
         return self.outliers.after / self.outliers.before if self.outliers.before else 1.0
 
 
-def energy_kept(state: Any) -> float | None:
+def energy_kept(state: object) -> float | None:
     """`Cleaned.energy_kept`; None for a method without the stage."""
     return state.energy_kept if isinstance(state, Cleaned) else None

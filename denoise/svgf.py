@@ -37,7 +37,7 @@ from .atrous import (
     with_luminance,
 )
 from .demodulation import Texture, read_texture
-from .history import RecordState, no_history
+from .history import RecordState, no_history, pack_records
 from .lanes import OnLanes
 from .moments import (
     SHORT,
@@ -45,7 +45,6 @@ from .moments import (
     AccumulationWeights,
     accumulate,
     estimate_variances,
-    pack_accumulated,
     tabulate_moments,
 )
 from .parameters import HISTORY_RENAMED, check_positive, check_range, check_whole
@@ -125,26 +124,25 @@ class Svgf(OnLanes["RecordState[Passes]"]):
         """`color` is used where the frame is one signal."""
         stencil, sample = state.stencil, surface.sample
         motion = motion_between(state.previous or frame, frame, stencil)
-        light = self._read_light(frame, color, stencil)
+        light = self._demodulate(frame, color, stencil)
         changes = self.shading_changes(frame, len(light.signals), state)
         geometry = read_geometry(stencil, surface, self.sigma_depth)
+        weights = self._level_weights(stencil)
         passes = self._passes(state, len(light.signals))
         evaluate(light.signals, sample, geometry)
 
         passes.guides.store(geometry.guides)
-        accumulated, table = passes.accumulate(
+        accumulated, window_table = passes.accumulate(
             light.signals, sample, motion, state.records, geometry.guides, changes,
             self._least_weights(stencil, len(light.signals)), self._tests(stencil))
-        weights = self._level_weights(stencil)
-        variances = passes.estimate_variances(accumulated, geometry, table,
-                                              self._enough(stencil), weights.half_power)
-        first, last = passes.filter_levels(accumulated, variances, geometry, weights)
-        records = state.records
-        if self.accumulate:
-            history = _with_colors(accumulated, first) if self.feedback else accumulated
-            records = passes.pack(sample, history)
-        return light.color(last), replace(state, passes=passes, records=records,
-                                          previous=without_images(frame))
+        variances = passes.estimate_variances(accumulated, geometry, window_table,
+                                              self._min_temporal_length(stencil),
+                                              weights.half_power)
+        filtered = passes.filter_levels(accumulated, variances, geometry, weights)
+        history = self._history(accumulated, filtered)
+        records = passes.pack(sample, history) if self.accumulate else state.records
+        return light.modulate(filtered.last_level), replace(
+            state, passes=passes, records=records, previous=without_images(frame))
 
     def shading_changes(self, frame: Frame, count: int,
                         state: RecordState[Passes]) -> list[Float]:
@@ -155,7 +153,8 @@ class Svgf(OnLanes["RecordState[Passes]"]):
         """alpha of each signal."""
         return [self.alpha] * count
 
-    def _read_light(self, frame: Frame, color: Color, stencil: Stencil) -> Light:
+    def _demodulate(self, frame: Frame, color: Color, stencil: Stencil) -> Light:
+        """The frame's light without texture, direct and indirect apart where it has them."""
         texture = read_texture(frame, stencil, self.demodulate)
         if not self.split or not all(name in frame for name in SIGNALS):
             return Light([with_luminance(texture.demodulate(color))], texture)
@@ -186,10 +185,18 @@ class Svgf(OnLanes["RecordState[Passes]"]):
         return LevelWeights(luminance_weight(stencil, self.sigma_luminance),
                             stencil.opaque(LOG2E * self.normal_power / 2))
 
-    def _enough(self, stencil: Stencil) -> Float:
+    def _min_temporal_length(self, stencil: Stencil) -> Float:
         """Length of history from which on its moments give the variance."""
         return stencil.opaque(SHORT if self.temporal_variance
                               else 2 * self.max_history_length + 1)
+
+    def _history(self, accumulated: Accumulated, filtered: FilteredColors) -> Accumulated:
+        """What the next frame blends with."""
+        if not self.feedback:
+            return accumulated
+        return accumulated._replace(signals=[
+            signal._replace(color=color)
+            for signal, color in zip(accumulated.signals, filtered.first_level, strict=True)])
 
 
 @dataclass(frozen=True)
@@ -199,33 +206,26 @@ class Light:
     signals: list[LuminanceColor]
     texture: Texture
 
-    def color(self, signals: Sequence[LuminanceColor]) -> Color:
-        """The colour that (filtered) signals make."""
+    def modulate(self, signals: Sequence[LuminanceColor]) -> Color:
+        """The colour that filtered signals make."""
         total, *others = [with_green(signal) for signal in signals]
         for light in others:
             total = Color(*[a + b for a, b in zip(total, light)])
         return self.texture.modulate(total)
 
 
-def _with_colors(accumulated: Accumulated, colors: Sequence[LuminanceColor]) -> Accumulated:
-    """With these in the place of the signals' colours."""
-    return accumulated._replace(signals=[
-        signal._replace(color=color)
-        for signal, color in zip(accumulated.signals, colors, strict=True)])
-
-
 class Blended(NamedTuple):
     """What is accumulated, and `tabulate_moments` of it."""
 
     accumulated: Accumulated
-    table: Float
+    window_table: Float
 
 
 class FilteredColors(NamedTuple):
     """Each signal after the first level and after the last one."""
 
-    first: list[LuminanceColor]
-    last: list[LuminanceColor]
+    first_level: list[LuminanceColor]
+    last_level: list[LuminanceColor]
 
 
 @dataclass(frozen=True)
@@ -253,7 +253,7 @@ class Passes:
 
         return Passes(guides, Step(blend), Step(lambda *a: estimate_variances(stencil, *a)),
                       [Levels.make(stencil, guides, levels) for _ in range(count)],
-                      Step(lambda *a: pack_accumulated(stencil, *a)))
+                      Step(lambda *a: pack_records(stencil, *a)))
 
     def filter_levels(self, accumulated: Accumulated, variances: list[Float], geometry: Geometry,
                       weights: LevelWeights) -> FilteredColors:
