@@ -75,8 +75,9 @@ def accumulate(stencil: Stencil, fallback: bool, signals: list[LuminanceColor],
     """Blend with the history.
 
     Args:
-        motion: of `reprojection.motion_between`. records: of what this gave for the frame before, or
-            of it with other colours (`history.pack_records`).
+        motion: of `reprojection.motion_between`.
+        records: `history.pack_records` of what this gave for the frame before, which may have
+            got other colours.
         changes: lambda of each signal, which then has a length of its own; or none.
     """
     place = locate(stencil, surface, motion, tests.plane_tolerance)
