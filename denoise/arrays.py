@@ -5,6 +5,7 @@ offer the same operations with the same signatures, so type checkers are given t
 At run time the names stand for anything: importing this module loads neither.
 """
 
+# pyright: standard
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple

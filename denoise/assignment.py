@@ -10,50 +10,51 @@ Departures: those of the two stages (`bilateral.py` or `atrous.py`, and `tempora
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Generic
 
 from render.frame import Frame
 
 from .arrays import Color
-from .atrous import Atrous
-from .bilateral import Bilateral
-from .lanes import OnLanes
+from .atrous import Atrous, AtrousState
+from .bilateral import Bilateral, BilateralState
+from .lanes import OnLanes, State
 from .stencil import Stencil
 from .surface import Surface
 from .temporal import Temporal, TemporalState
 
 
 @dataclass(frozen=True)
-class FilteredState:
+class FilteredState(Generic[State]):
     """State of the filter and of the accumulation, on one stencil."""
 
     stencil: Stencil
-    filter: Any
+    filter: State
     history: TemporalState
 
 
-class _Filtered(OnLanes):
+@dataclass(frozen=True)
+class _Filtered(OnLanes[FilteredState[State]], Generic[State]):
     """Filter, then accumulate: what both variants share."""
 
-    filter: Bilateral | Atrous
+    filter: OnLanes[State]
     history: Temporal
 
     @property
     def reach(self) -> int:
         return max(self.filter.reach, self.history.reach)
 
-    def init_on(self, stencil: Stencil) -> FilteredState:
+    def init_on(self, stencil: Stencil) -> FilteredState[State]:
         return FilteredState(stencil, self.filter.init_on(stencil), self.history.init_on(stencil))
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,
-                 state: FilteredState) -> tuple[Color, FilteredState]:
+                 state: FilteredState[State]) -> tuple[Color, FilteredState[State]]:
         filtered, _ = self.filter.on_lanes(frame, color, surface, state.filter)
         result, history = self.history.on_lanes(frame, filtered, surface, state.history)
         return result, replace(state, history=history)
 
 
 @dataclass(frozen=True)
-class Assignment(_Filtered):
+class Assignment(_Filtered[BilateralState]):
     """Joint bilateral filter, then clamped accumulation: the assignment as set.
 
     Attributes:
@@ -72,7 +73,7 @@ class Assignment(_Filtered):
 
 
 @dataclass(frozen=True)
-class AssignmentAtrous(_Filtered):
+class AssignmentAtrous(_Filtered[AtrousState]):
     """A-trous filter, then clamped accumulation: the assignment's bonus task, done as published.
 
     Attributes:

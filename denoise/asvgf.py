@@ -19,9 +19,9 @@ Departures:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar, NamedTuple
 
 import drjit as dr
 import numpy as np
@@ -29,15 +29,14 @@ import numpy as np
 from render.channels import REPLAY
 from render.frame import Frame
 
-from .arrays import Color, Float
+from .arrays import Float
 from .atrous import LARGEST_LEVELS, SPLINE
 from .history import RecordState
 from .lanes import OnLanes
 from .parameters import check_positive, check_range, check_whole
 from .stencil import Planes, Stencil, Step, Taps, window
-from .structure import evaluate
-from .surface import Surface
-from .svgf import Svgf, added_up
+from .structure import evaluate, mapped
+from .svgf import Passes, Svgf
 
 STRATUM = 3          # pixels, side
 _LEAST = 1e-6        # radiance; darker samples say nothing
@@ -81,22 +80,27 @@ class Asvgf(Svgf):
         return AsvgfState(plain.stencil, plain.records,
                           gradients=Gradients.make(stencil, self.gradient_levels))
 
+    def shading_changes(self, frame: Frame, count: int,
+                        state: RecordState[Passes]) -> list[Float]:
+        assert isinstance(state, AsvgfState)
+        return state.gradients.find(frame, count, self.gradient_scale)
+
     def alphas(self, count: int) -> list[float]:
         return [self.alpha, self.alpha_indirect][:count]
 
-    def on_lanes(self, frame: Frame, color: Color, surface: Surface,
-                 state: Any) -> tuple[Color, Any]:
-        lights, texture = self.read_lights(frame, color, state.stencil)
-        changes = state.gradients.find(frame, len(lights), self.gradient_scale)
-        filtered, state = self.filter_lights(frame, lights, surface, state, changes)
-        return texture.modulate(added_up(filtered)), state
+
+class OfLights(NamedTuple):
+    """A number for each light; both are that of their sum where there is one signal."""
+
+    direct: Float
+    indirect: Float
 
 
-@dataclass(frozen=True)
-class AsvgfState(RecordState):
-    """`RecordState`, and what filters gradients."""
+class StrataSums(NamedTuple):
+    """sum |now - before| and sum max(now, before) of each stratum, or means of these."""
 
-    gradients: Any = None
+    change: OfLights
+    largest: OfLights
 
 
 @dataclass(frozen=True)
@@ -106,30 +110,36 @@ class Gradients:
     stencil: Stencil
     strata: Stencil
     planes: Planes
-    taps: list[Taps]
-    steps: list[Step[..., Any]]
-    spread: Step[..., Any]
+    taps: list[Taps[StrataSums]]
+    steps: list[Step[..., StrataSums]]
+    spread: Step[..., OfLights]
 
     @staticmethod
     def make(stencil: Stencil, levels: int) -> Gradients:
         height, width = (-(-size // STRATUM) for size in (stencil.height, stencil.width))
         strata = Stencil(height, width, 2 << (levels - 1))
         planes = strata.planes([0.0] * 4)
-        taps = [planes.taps([(dy << i, dx << i) for dy, dx in window(2)]) for i in range(levels)]
-
-        def spread(sums: list[Float], scale: list[Float]) -> list[Float]:
-            return spread_strata(stencil, strata, sums, scale)
-
-        return Gradients(stencil, strata, planes, taps, [Step(blur) for _ in taps], Step(spread))
+        taps = [planes.taps([(dy << i, dx << i) for dy, dx in window(2)]).named(_strata_sums)
+                for i in range(levels)]
+        return Gradients(stencil, strata, planes, taps, [Step(blur) for _ in taps],
+                         Step(lambda *a: spread_strata(stencil, strata, *a)))
 
     def find(self, frame: Frame, count: int, scale: float) -> list[Float]:
         """lambda of each of `count` signals, on the lanes of the image's stencil."""
-        sums = self.strata.load(gather_strata(frame["replay"], frame["replay_before"], count))
+        sums = _strata_sums(*self.strata.load(
+            gather_strata(frame["replay"], frame["replay_before"], count)))
         evaluate(sums)
         for taps, step in zip(self.taps, self.steps, strict=True):
             self.planes.store(sums)
             sums = step(taps, sums)
-        return self.spread(sums, [self.stencil.opaque(scale)])[:count]
+        return list(self.spread(sums, self.stencil.opaque(scale)))[:count]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AsvgfState(RecordState[Passes]):
+    """`RecordState`, and what filters gradients."""
+
+    gradients: Gradients
 
 
 def gather_strata(now: np.ndarray, before: np.ndarray, count: int) -> np.ndarray:
@@ -152,24 +162,32 @@ def gather_strata(now: np.ndarray, before: np.ndarray, count: int) -> np.ndarray
     return blocks.sum((1, 3)).clip(0, 1e18).astype(np.float32)
 
 
-def blur(taps: Taps, center: list[Float]) -> list[Float]:
+def blur(taps: Taps[StrataSums], center: StrataSums) -> StrataSums:
     """One level of F."""
-    sums: Sequence[Float] = [c * SPLINE[0]**2 for c in center]
+    sums = mapped(lambda c: c * SPLINE[0]**2, center)
     for i, (dy, dx) in enumerate(window(2)):
-        h = SPLINE[abs(dy)] * SPLINE[abs(dx)]
-        sums = [dr.fma(tap, h, s) for tap, s in zip(taps.at(i), sums)]
+        sums = mapped(_weighted(SPLINE[abs(dy)] * SPLINE[abs(dx)]), taps.at(i), sums)
         taps.next()
-    return list(sums)
+    return sums
 
 
-def spread_strata(stencil: Stencil, strata: Stencil, sums: list[Float],
-                  scale: list[Float]) -> list[Float]:
-    """lambda of both signals at each pixel, from its stratum."""
+def _weighted(h: float) -> Callable[[Float, Float], Float]:
+    """Function of (tap, sum)."""
+    return lambda tap, total: dr.fma(tap, h, total)
+
+
+def spread_strata(stencil: Stencil, strata: Stencil, sums: StrataSums, scale: Float) -> OfLights:
+    """lambda of both lights at each pixel, from its stratum; scale: gradient_scale."""
     row, column = stencil.pixel()
     lane = (row // STRATUM) * strata.stride + column // STRATUM
-    changes = []
-    for s in range(2):
-        change, most = (dr.gather(stencil.Float, sums[c], lane) for c in (s, 2 + s))
+
+    def change_of(light: int) -> Float:
+        change, most = (dr.gather(stencil.Float, s[light], lane) for s in sums)
         g = dr.select(most > _LEAST, change / dr.maximum(most, _LEAST), 0)
-        changes.append(dr.minimum(g * scale[0], 1))
-    return changes
+        return dr.minimum(g * scale, 1)
+
+    return OfLights(change_of(0), change_of(1))
+
+
+def _strata_sums(*planes: Float) -> StrataSums:
+    return StrataSums(OfLights(*planes[:2]), OfLights(*planes[2:]))

@@ -32,22 +32,21 @@ out of the three at the end, with an error of 1e-7 times the brightest of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import drjit as dr
 
 from render.frame import Frame
 
-from .arrays import Color, Float
+from .arrays import Color, Float, Vector3
 from .demodulation import read_texture
 from .exponential import exp2
 from .lanes import OnLanes
 from .parameters import check_positive, check_whole
-from .stencil import Stencil, Step, Taps, window
+from .stencil import Planes, Stencil, Step, Taps, single, window
 from .structure import evaluate
-from .surface import LUMINANCE, Surface, luminance
+from .surface import LUMINANCE, Surface, TangentPlane, luminance
 
 LOG2E = 1.4426950408889634
 SPLINE = {0: 3 / 8, 1: 1 / 4, 2: 1 / 16}
@@ -57,11 +56,50 @@ LARGEST_LEVELS = 8
 EPSILON = 1e-6       # radiance; below it differences of luminance do not count
 BACKGROUND = -1e8    # 1/z where there is no surface: far from any plane, so that its weight is 0
 _OUTSIDE = -1e15     # 1/z outside the image
+_LUMINANCE, _VARIANCE = 1, 3  # which plane of a `NoisyColor`
+_INVERSE_DEPTH = 3   # which plane of `Guides`
 _BACKGROUND_SCALE = 1e3  # |k| / sigma_plane of background, whose like alone count
 
 
+class LuminanceColor(NamedTuple):
+    """A colour whose green is told by its luminance, see the module's header."""
+
+    red: Float
+    luminance: Float
+    blue: Float
+
+
+class NoisyColor(NamedTuple):
+    """A colour and the variance of its luminance."""
+
+    color: LuminanceColor
+    variance: Float
+
+
+class Guides(NamedTuple):
+    """What a tap is weighed by: n, (1, 0, 0) without a surface, and 1/z, far away without one."""
+
+    normal: Vector3
+    inverse_depth: Float
+
+
+class LuminanceWeight(NamedTuple):
+    """How differences of luminance are weighed: eps, radiance; sigma_luminance / log2(e)."""
+
+    epsilon: Float
+    sigma: Float
+
+
+class LevelWeights(NamedTuple):
+    """How a level weighs differences: of luminance; of normals, by sqrt(log2(e) normal_power / 2).
+    """
+
+    luminance: LuminanceWeight
+    normal_root: Float
+
+
 @dataclass(frozen=True)
-class Atrous(OnLanes):
+class Atrous(OnLanes["AtrousState"]):
     """A-trous filter of each frame on its own.
 
     Attributes:
@@ -93,140 +131,200 @@ class Atrous(OnLanes):
         return max(2 << (self.levels - 1), VARIANCE_RADIUS)
 
     def init_on(self, stencil: Stencil) -> AtrousState:
-        signal, guides = stencil.planes([0.0] * 4), stencil.planes([0.0] * 3 + [_OUTSIDE])
-        level_taps = []
-        for i in range(self.levels):
-            offsets = [(dy << i, dx << i) for dy, dx in (*window(2), (0, 0))]
-            level_taps.append((signal.taps(offsets), guides.taps(offsets)))
-        near = [*window(VARIANCE_RADIUS), (0, 0)]
-        return AtrousState(stencil, signal, guides, level_taps, signal.taps(window(1), [3]),
-                           (signal.taps(near, [1]), guides.taps(near, [3])),
-                           [stencil.opaque(1 << i) for i in range(self.levels)],
-                           Step(estimate_variance), [Step(level) for _ in range(self.levels)])
+        return AtrousState.make(stencil, self.levels)
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,
                  state: AtrousState) -> tuple[Color, AtrousState]:
         stencil = state.stencil
         texture = read_texture(frame, stencil, self.demodulate)
-        light = texture.demodulate(color)
-        float_t = stencil.Float
-        normal = [dr.select(surface.is_valid, n, m) for n, m in zip(surface.normal, (1, 0, 0))]
-        inverse_depth = dr.select(surface.is_valid, surface.inverse_depth, float_t(BACKGROUND))
-        scale = dr.select(surface.is_valid, dr.abs(surface.plane_distance)
-                          * stencil.opaque(1 / self.sigma_plane), float_t(_BACKGROUND_SCALE))
-        guides, plane = [*normal, inverse_depth], [*surface.slope, scale]
-        light = [light.red, luminance(light), light.blue]
+        light = with_luminance(texture.demodulate(color))
+        guides, plane = self._read_guides(surface, stencil)
         evaluate(light, guides, plane)
+
         state.guides.store(guides)
-        state.signal.store(light, gutters=True)
-        signal = [*light, state.variance_step(*state.variance_taps, plane)]
-        state.signal.store(signal[3:], first=3)
-        numbers = [stencil.opaque(EPSILON), stencil.opaque(self.sigma_luminance / LOG2E),
-                   stencil.opaque(math.sqrt(LOG2E * self.normal_power / 2))]
-        for i in range(self.levels):
-            if i > 0:
-                state.signal.store(signal[:3], gutters=True)
-                state.signal.store(signal[3:], first=3)
-            signal = state.level_steps[i](state.blur_taps, *state.level_taps[i], signal[3:], plane,
-                                          [state.spacings[i], *numbers])
-        return texture.modulate(with_green(signal)), state
+        noisy = state.estimate_variance(light, plane)
+        filtered = state.filter_levels(noisy, plane, self._weights(stencil))
+        return texture.modulate(with_green(filtered.color)), state
+
+    def _read_guides(self, surface: Surface, stencil: Stencil) -> tuple[Guides, TangentPlane]:
+        """Of each pixel; background is far away from any surface, and flat."""
+        is_valid = surface.is_valid
+        normal = Vector3(*[dr.select(is_valid, n, m) for n, m in zip(surface.normal, (1, 0, 0))])
+        inverse_depth = dr.select(is_valid, surface.inverse_depth, stencil.Float(BACKGROUND))
+        scale = dr.select(is_valid, dr.abs(surface.plane_distance)
+                          * stencil.opaque(1 / self.sigma_plane), stencil.Float(_BACKGROUND_SCALE))
+        return Guides(normal, inverse_depth), TangentPlane(inverse_depth, *surface.slope, scale)
+
+    def _weights(self, stencil: Stencil) -> LevelWeights:
+        return LevelWeights(luminance_weight(stencil, self.sigma_luminance),
+                            stencil.opaque(math.sqrt(LOG2E * self.normal_power / 2)))
+
+
+@dataclass(frozen=True)
+class Level:
+    """A level's taps, their distance in pixels, and the recorded step. The last tap is the pixel
+    itself."""
+
+    signal: Taps[NoisyColor]
+    guides: Taps[Guides]
+    spacing: Float
+    step: Step[..., NoisyColor]
+
+    @staticmethod
+    def make(i: int, signal: Planes, guides: Planes) -> Level:
+        """Level i."""
+        offsets = [(dy << i, dx << i) for dy, dx in (*window(2), (0, 0))]
+        return Level(signal.taps(offsets).named(noisy_color), guides.taps(offsets).named(_guides),
+                     signal.stencil.opaque(1 << i), Step(filter_level))
 
 
 @dataclass(frozen=True)
 class AtrousState:
-    """Planes of the signal (r, l, b, variance) and of the guides (n, 1/z), and their taps: the
-    pixel itself is the last of a level's, and of those that variance is estimated from."""
+    """The planes and recorded steps, and the passes that they are.
+
+    Attributes:
+        signal: planes of a `NoisyColor`. guides: planes of `Guides`.
+        blur_taps: variance of the 3x3 pixels around.
+        window_luminance, window_inverse_depth: of the window that variance is estimated from; the
+            last tap is the pixel itself.
+    """
 
     stencil: Stencil
-    signal: Any
-    guides: Any
-    level_taps: list[tuple[Taps, Taps]]
-    blur_taps: Taps
-    variance_taps: tuple[Taps, Taps]
-    spacings: list[Float]
-    variance_step: Step[..., Any]
-    level_steps: list[Step[..., Any]]
+    signal: Planes
+    guides: Planes
+    blur_taps: Taps[Float]
+    window_luminance: Taps[Float]
+    window_inverse_depth: Taps[Float]
+    variance_step: Step[..., Float]
+    levels: list[Level]
+
+    @staticmethod
+    def make(stencil: Stencil, levels: int) -> AtrousState:
+        signal, guides = stencil.planes([0.0] * 4), stencil.planes([0.0] * 3 + [_OUTSIDE])
+        level_taps = [Level.make(i, signal, guides) for i in range(levels)]
+        around = [*window(VARIANCE_RADIUS), (0, 0)]
+        return AtrousState(stencil, signal, guides,
+                           signal.taps(window(1), [_VARIANCE]).named(single),
+                           signal.taps(around, [_LUMINANCE]).named(single),
+                           guides.taps(around, [_INVERSE_DEPTH]).named(single),
+                           Step(estimate_variance), level_taps)
+
+    def estimate_variance(self, light: LuminanceColor, plane: TangentPlane) -> NoisyColor:
+        """The light with the variance of its luminance over a window, both stored."""
+        self.signal.store(light, gutters=True)
+        variance = self.variance_step(self.window_luminance, self.window_inverse_depth, plane)
+        self.signal.store(variance, first=_VARIANCE)
+        return NoisyColor(light, variance)
+
+    def filter_levels(self, noisy: NoisyColor, plane: TangentPlane,
+                      weights: LevelWeights) -> NoisyColor:
+        """All levels, of which the first finds its input stored."""
+        for i, level in enumerate(self.levels):
+            if i > 0:
+                self.signal.store(noisy.color, gutters=True)
+                self.signal.store(noisy.variance, first=_VARIANCE)
+            noisy = level.step(self.blur_taps, level.signal, level.guides, noisy.variance, plane,
+                               level.spacing, weights)
+        return noisy
 
 
-def estimate_variance(signal: Taps, guides: Taps, plane: list[Float]) -> Float:
+def luminance_weight(stencil: Stencil, sigma_luminance: float) -> LuminanceWeight:
+    return LuminanceWeight(stencil.opaque(EPSILON), stencil.opaque(sigma_luminance / LOG2E))
+
+
+def noisy_color(red: Float, luminance: Float, blue: Float, variance: Float) -> NoisyColor:
+    """Of planes side by side."""
+    return NoisyColor(LuminanceColor(red, luminance, blue), variance)
+
+
+def _guides(nx: Float, ny: Float, nz: Float, inverse_depth: Float) -> Guides:
+    return Guides(Vector3(nx, ny, nz), inverse_depth)
+
+
+def estimate_variance(luminances: Taps[Float], inverse_depths: Taps[Float],
+                      plane: TangentPlane) -> Float:
     """Variance of the luminance over the taps within sigma_plane of the pixel's plane.
 
     Sums run over differences from the pixel itself, which keeps digits on bright pixels.
     """
-    gx, gy, scale = plane
-    (lum,), (inverse_depth,), limit = signal.at(-1), guides.at(-1), 1 / scale
+    lum, inverse_depth, limit = luminances.at(-1), inverse_depths.at(-1), 1 / plane.scale
     float_t = type(lum)
     count, sum1, sum2, row = float_t(1), float_t(0), float_t(0), inverse_depth
     for i, (dy, dx) in enumerate(window(VARIANCE_RADIUS)):
         if dx == -VARIANCE_RADIUS:
-            row = dr.fma(gy, float(dy), inverse_depth)
-        distance = dr.abs(guides.at(i)[0] - dr.fma(gx, float(dx), row))
+            row = dr.fma(plane.dy, float(dy), inverse_depth)
+        distance = dr.abs(inverse_depths.at(i) - dr.fma(plane.dx, float(dx), row))
         on_plane = dr.select(distance < limit, float_t(1), 0)
-        d = signal.at(i)[0] - lum
+        d = luminances.at(i) - lum
         counted = d * on_plane
         count, sum1, sum2 = count + on_plane, sum1 + counted, dr.fma(d, counted, sum2)
-        signal.next()
+        luminances.next()
     mean = sum1 / count
     variance = dr.fma(-mean, mean, sum2 / count)
     return dr.select(variance > 0, variance, 0)
 
 
-def luminance_scale(taps: Taps, variance: list[Float], numbers: list[Float]) -> Float:
-    """log2(e) / (sigma_luminance sqrt(g3x3(v)) + eps)."""
-    epsilon, sigma, *_ = numbers
-    blurred = variance[0] * BINOMIAL[0]**2
-    for i, (dy, dx) in enumerate(window(1)):
-        blurred = dr.fma(taps.at(i)[0], BINOMIAL[abs(dy)] * BINOMIAL[abs(dx)], blurred)
-    return 1 / dr.fma(sigma, dr.sqrt(blurred), epsilon)
+def luminance_scale(variances: Taps[Float], variance: Float, weight: LuminanceWeight) -> Float:
+    """log2(e) / (sigma_luminance sqrt(g3x3(v)) + eps).
 
-
-def level(blur: Taps, signal: Taps, guides: Taps, variance: list[Float], plane: list[Float],
-          numbers: list[Float]) -> list[Float]:
-    """One level: filtered r, l, b and variance.
-
-    In two kernels: one alone would not find room in the registers.
+    Args:
+        variances: of the 3x3 pixels around. variance: of the pixel itself.
     """
-    spacing, epsilon, sigma, q = numbers
-    scale_of_l = luminance_scale(blur, variance, [epsilon, sigma])
-    evaluate(scale_of_l)
-    return filter_level(signal, guides, plane, scale_of_l, spacing, q)
+    blurred = variance * BINOMIAL[0]**2
+    for i, (dy, dx) in enumerate(window(1)):
+        blurred = dr.fma(variances.at(i), BINOMIAL[abs(dy)] * BINOMIAL[abs(dx)], blurred)
+    return 1 / dr.fma(weight.sigma, dr.sqrt(blurred), weight.epsilon)
 
 
-def filter_level(signal: Taps, guides: Taps, plane: list[Float], scale_of_l: Float, spacing: Float,
-                 q: Float) -> list[Float]:
-    """Mean of the taps by weight. q: sqrt(log2(e) normal_power / 2), so that with u = q t the
-    exponent of the normals is u (u + 2 q).
+def filter_level(variances: Taps[Float], signal: Taps[NoisyColor], guides: Taps[Guides],
+                 variance: Float, plane: TangentPlane, spacing: Float,
+                 weights: LevelWeights) -> NoisyColor:
+    """One level, in two kernels: one alone would not find room in the registers."""
+    scale = luminance_scale(variances, variance, weights.luminance)
+    evaluate(scale)
+    return mean_of_taps(signal, guides, plane, scale, spacing, weights.normal_root)
+
+
+def mean_of_taps(signal: Taps[NoisyColor], guides: Taps[Guides], plane: TangentPlane,
+                 luminance_scale: Float, spacing: Float, normal_root: Float) -> NoisyColor:
+    """Mean of the taps by weight. With q = normal_root, sqrt(log2(e) normal_power / 2), and u = q t
+    the exponent of the normals is u (u + 2 q).
 
     The pixel's own values are read from the planes too, where its neighbours have brought them
     into the cache. What waits in a register counts: a vector on the stack, across two cache lines
     as it may lie, costs a level up to half its time.
     """
-    red, lum, blue, variance = signal.at(-1)
-    *normal, inverse_depth = guides.at(-1)
+    (red, lum, blue), variance = signal.at(-1)
+    normal, inverse_depth = guides.at(-1)
+    q = normal_root
     nx, ny, nz = (-q * n for n in normal)
-    gx, gy, scale = plane[0] * spacing, plane[1] * spacing, plane[2] * LOG2E
+    dx_, dy_, scale = plane.dx * spacing, plane.dy * spacing, plane.scale * LOG2E
     two_q, h0 = 2 * q, SPLINE[0]**2
     total = type(lum)(h0)
     r, y, b, v = red * h0, lum * h0, blue * h0, variance * h0**2
     row = inverse_depth
     for i, (dy, dx) in enumerate(window(2)):
-        tr, ty, tb, tv = signal.at(i)
-        tnx, tny, tnz, tap_inverse_depth = guides.at(i)
+        tap, tap_variance = signal.at(i)
+        tap_normal, tap_inverse_depth = guides.at(i)
         if dx == -2:
-            row = dr.fma(gy, float(dy), inverse_depth)
-        u = dr.fma(nx, tnx, dr.fma(ny, tny, dr.fma(nz, tnz, q)))
+            row = dr.fma(dy_, float(dy), inverse_depth)
+        u = dr.fma(nx, tap_normal.x, dr.fma(ny, tap_normal.y, dr.fma(nz, tap_normal.z, q)))
         e = dr.fma(-u, u + two_q, math.log2(SPLINE[abs(dy)] * SPLINE[abs(dx)]))
-        e = dr.fma(dr.abs(tap_inverse_depth - dr.fma(gx, float(dx), row)), -scale, e)
-        w = exp2(dr.fma(dr.abs(ty - lum), -scale_of_l, e))
-        r, y, b, total = dr.fma(w, tr, r), dr.fma(w, ty, y), dr.fma(w, tb, b), total + w
-        v = dr.fma(w * w, tv, v)
+        e = dr.fma(dr.abs(tap_inverse_depth - dr.fma(dx_, float(dx), row)), -scale, e)
+        w = exp2(dr.fma(dr.abs(tap.luminance - lum), -luminance_scale, e))
+        r, y, b = dr.fma(w, tap.red, r), dr.fma(w, tap.luminance, y), dr.fma(w, tap.blue, b)
+        total = total + w
+        v = dr.fma(w * w, tap_variance, v)
         signal.next()
     norm = 1 / total
-    return [r * norm, y * norm, b * norm, v * norm * norm]
+    return NoisyColor(LuminanceColor(r * norm, y * norm, b * norm), v * norm * norm)
 
 
-def with_green(signal: Sequence[Float]) -> Color:
-    """(r, g, b) of (r, luminance, b, ...)."""
-    r, y, b, *_ = signal
+def with_luminance(color: Color) -> LuminanceColor:
+    return LuminanceColor(color.red, luminance(color), color.blue)
+
+
+def with_green(color: LuminanceColor) -> Color:
+    r, y, b = color
     red, green, blue = LUMINANCE
     return Color(r, dr.fma(r, -red / green, dr.fma(b, -blue / green, y * (1 / green))), b)

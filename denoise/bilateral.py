@@ -24,18 +24,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import drjit as dr
 
 from render.frame import Frame
 
-from .arrays import Color, Float
+from .arrays import Color, Float, Vector3
 from .demodulation import read_texture
 from .exponential import exp2
 from .lanes import OnLanes
 from .parameters import check_positive, check_whole
-from .stencil import Planes, Stencil, Step, Taps
+from .stencil import Offset, Planes, Stencil, Step, Taps
 from .structure import evaluate
 from .surface import Surface
 
@@ -48,8 +48,49 @@ _KIND = 4.0       # fourth component of a normal: + surface, - none; its product
 _TINY = 1e-30     # |Pj - Pi|^2 of a pixel and itself
 
 
+class BilateralSample(NamedTuple):
+    """What a pixel is weighed by: colour scaled so that the square of a difference is its exponent
+    of 2; (n, kind); position."""
+
+    color: Color
+    normal: Vector3
+    kind: Float
+    position: Vector3
+
+
+class Center(NamedTuple):
+    """The pixel itself, and (n, kind) . (n, kind)."""
+
+    sample: BilateralSample
+    self_product: Float
+
+
+class AngleTerm(NamedTuple):
+    """Factors of t, t^2 and t^3 in the log2 of the normals' weight."""
+
+    linear: Float
+    quadratic: Float
+    cubic: Float
+
+
+class BilateralWeights(NamedTuple):
+    """log2 of the weight of a pixel^2, of 1 - the cosine between normals, and of the square of the
+    sine of the angle with the plane."""
+
+    coord: Float
+    angle: AngleTerm
+    plane: Float
+
+
+class WeightedColor(NamedTuple):
+    """Sums of w C and of w."""
+
+    color: Color
+    weight: Float
+
+
 @dataclass(frozen=True)
-class Bilateral(OnLanes):
+class Bilateral(OnLanes["BilateralState"]):
     """Joint bilateral filter of each frame on its own.
 
     Attributes:
@@ -86,89 +127,117 @@ class Bilateral(OnLanes):
         return self.radius
 
     def init_on(self, stencil: Stencil) -> BilateralState:
-        planes = stencil.planes(OUTSIDE)
+        planes, step = stencil.planes(OUTSIDE), Step(add_taps)
         window = range(-self.radius, self.radius + 1)
-        rows = [planes.taps([(dy, dx) for dx in window]) for dy in window]
-        squares = [stencil.opaque(dy * dy) for dy in window]
-        return BilateralState(stencil, planes, rows, squares, Step(add_row_of_taps))
+        return BilateralState(stencil, planes, [
+            TapLine.make(planes, [(dy, dx) for dx in window], dy, step) for dy in window])
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,
                  state: BilateralState) -> tuple[Color, BilateralState]:
         stencil = state.stencil
         texture = read_texture(frame, stencil, self.demodulate)
-        center, weights = self.prepare(texture.demodulate(color), surface, state.planes)
-        sums = [stencil.constant(0) for _ in range(4)]
-        for taps, square in zip(state.rows, state.squares, strict=True):
-            sums = state.step(taps, center, sums, [*weights, square])
-        return texture.modulate(self.mean(sums, stencil)), state
+        center = self.prepare(texture.demodulate(color), surface, state.planes)
+        weights, sums = self.weights(stencil), no_taps(stencil)
+        for row in state.lines:
+            sums = row.add(center, sums, weights)
+        norm = 1 / (sums.weight * stencil.opaque(self.color_scale))
+        return texture.modulate(Color(*[s * norm for s in sums.color])), state
 
-    def prepare(self, light: Color, surface: Surface,
-                planes: Planes) -> tuple[list[Float], list[Float]]:
-        """Fill the planes; `center` and `weights` of `add_row_of_taps`, these without dy^2."""
+    def prepare(self, light: Color, surface: Surface, planes: Planes) -> Center:
+        """Fill the planes with each pixel's sample, which its neighbours see; what it is itself."""
         stencil = planes.stencil
         k = stencil.opaque(self.color_scale)
         kind = dr.select(surface.is_valid, stencil.Float(_KIND), -_KIND)
-        pixels = [*(c * k for c in light), *surface.normal, kind, *surface.position]
+        sample = BilateralSample(Color(*[c * k for c in light]), surface.normal, kind,
+                                 surface.position)
         own_kind = dr.select(surface.is_valid, stencil.Float(_KIND),
                              -_KIND * self.isolate_background)
         self_product = dr.fma(own_kind, own_kind, dr.select(surface.is_valid, stencil.Float(1), 0))
-        evaluate(pixels, own_kind, self_product)
-        planes.store(pixels)
+        evaluate(sample, own_kind, self_product)
+        planes.store(sample)
+        return Center(sample._replace(kind=own_kind), self_product)
+
+    def weights(self, stencil: Stencil) -> BilateralWeights:
         half_log2e = LOG2E / 2
-        weights = ([stencil.opaque(-half_log2e / self.sigma_coord**2)]
-                   + [stencil.opaque(-half_log2e / self.sigma_normal**2 * a) for a in ACOS2]
-                   + [stencil.opaque(-half_log2e / self.sigma_plane**2)])
-        return [*pixels[:6], own_kind, *pixels[7:], self_product], weights
+        return BilateralWeights(
+            stencil.opaque(-half_log2e / self.sigma_coord**2),
+            AngleTerm(*[stencil.opaque(-half_log2e / self.sigma_normal**2 * a) for a in ACOS2]),
+            stencil.opaque(-half_log2e / self.sigma_plane**2))
 
     @property
     def color_scale(self) -> float:
         """Of colours in the planes, so that the square of a difference is its exponent of 2."""
         return math.sqrt(LOG2E / 2) / self.sigma_color
 
-    def mean(self, sums: list[Float], stencil: Stencil) -> Color:
-        """Colour from the sums of w times scaled colour, and of w."""
-        norm = 1 / (sums[3] * stencil.opaque(self.color_scale))
-        return Color(*[s * norm for s in sums[:3]])
+
+@dataclass(frozen=True)
+class TapLine:
+    """A row or a column of taps, the square of its distance from the pixel, and the recorded
+    step."""
+
+    taps: Taps[BilateralSample]
+    squared_distance: Float
+    step: Step[..., WeightedColor]
+
+    @staticmethod
+    def make(planes: Planes, offsets: list[Offset], distance: int,
+             step: Step[..., WeightedColor]) -> TapLine:
+        return TapLine(planes.taps(offsets).named(_sample), planes.stencil.opaque(distance**2),
+                       step)
+
+    def add(self, center: Center, sums: WeightedColor, weights: BilateralWeights) -> WeightedColor:
+        """The sums with these taps added."""
+        return self.step(self.taps, self.squared_distance, center, sums, weights)
 
 
 @dataclass(frozen=True)
 class BilateralState:
-    """Planes (colour 3, normal 3, kind, position 3) and their taps, a row of the window each."""
+    """Planes of a `BilateralSample`, and the lines of taps in the order of their passes."""
 
     stencil: Stencil
     planes: Planes
-    rows: list[Taps]
-    squares: list[Float]
-    step: Step[..., Any]
+    lines: list[TapLine]
 
 
-def add_row_of_taps(taps: Taps, center: list[Float], sums: list[Float],
-                    weights: list[Float]) -> list[Float]:
-    """Add one row of the window to the sums of w C (3) and w.
+def no_taps(stencil: Stencil) -> WeightedColor:
+    """Sums to begin with."""
+    return WeightedColor(Color(*[stencil.constant(0) for _ in range(3)]), stencil.constant(0))
+
+
+def add_taps(taps: Taps[BilateralSample], squared_distance: Float, center: Center,
+             sums: WeightedColor, weights: BilateralWeights) -> WeightedColor:
+    """Add a line of taps to the sums.
 
     Args:
-        taps: colour scaled by sqrt(log2(e) / 2) / sigma_color, (n, kind), position.
-        center: the same ten of the pixel itself, then (n, kind) . (n, kind).
-        weights: log2 weight of a pixel^2, the three of acos^2, of the plane term; then dy^2.
+        taps: along the line, the one nearest to the pixel in the middle.
+        squared_distance: of that one from the pixel.
     """
-    cr, cg, cb, nx, ny, nz, kind, px, py, pz, self_product = center
-    coord, a0, a1, a2, plane, dy2 = weights
-    r, g, b, w_sum = sums
+    (own_color, own_normal, own_kind, own_position), self_product = center
+    coord, angle, plane = weights
+    (cr, cg, cb), (nx, ny, nz), (px, py, pz) = own_color, own_normal, own_position
+    (r, g, b), w_sum = sums
     radius = len(taps) // 2
-    row = coord * dy2
+    line = coord * squared_distance
     for i in range(len(taps)):
-        tr, tg, tb, tnx, tny, tnz, tkind, tpx, tpy, tpz = taps.at(i)
-        dr_, dg, db = tr - cr, tg - cg, tb - cb
-        e = dr.fma(dr_, -dr_, dr.fma(coord, float((i - radius) ** 2), row))
+        color, normal, kind, position = taps.at(i)
+        dr_, dg, db = color.red - cr, color.green - cg, color.blue - cb
+        e = dr.fma(dr_, -dr_, dr.fma(coord, float((i - radius) ** 2), line))
         e = dr.fma(dg, -dg, e)
         e = dr.fma(db, -db, e)
-        t = dr.fma(-nx, tnx, dr.fma(-ny, tny, dr.fma(-nz, tnz, dr.fma(-kind, tkind, self_product))))
-        e = dr.fma(t, dr.fma(t, dr.fma(t, a2, a1), a0), e)
-        dx, dy, dz = tpx - px, tpy - py, tpz - pz
+        t = dr.fma(-nx, normal.x, dr.fma(-ny, normal.y, dr.fma(
+            -nz, normal.z, dr.fma(-own_kind, kind, self_product))))
+        e = dr.fma(t, dr.fma(t, dr.fma(t, angle.cubic, angle.quadratic), angle.linear), e)
+        dx, dy, dz = position.x - px, position.y - py, position.z - pz
         distance2 = dr.fma(dx, dx, dr.fma(dy, dy, dr.fma(dz, dz, _TINY)))
         across = dr.fma(nx, dx, dr.fma(ny, dy, nz * dz))
         e = dr.fma(across * across / distance2, plane, e)
         w = exp2(e)
-        r, g, b, w_sum = dr.fma(w, tr, r), dr.fma(w, tg, g), dr.fma(w, tb, b), w_sum + w
+        r, g, b = dr.fma(w, color.red, r), dr.fma(w, color.green, g), dr.fma(w, color.blue, b)
+        w_sum = w_sum + w
         taps.next()
-    return [r, g, b, w_sum]
+    return WeightedColor(Color(r, g, b), w_sum)
+
+
+def _sample(red: Float, green: Float, blue: Float, nx: Float, ny: Float, nz: Float, kind: Float,
+            px: Float, py: Float, pz: Float) -> BilateralSample:
+    return BilateralSample(Color(red, green, blue), Vector3(nx, ny, nz), kind, Vector3(px, py, pz))

@@ -33,7 +33,7 @@ BETTER_ON_PLAIN = ("temporal-oidn", "oidn-high")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE",
               help="A parameter of the method; may be given several times.")
 @click.option("--outliers", type=float, metavar="K",
-              help="Before the method, clamp each pixel to K "
+              help="Before the method, clamp each pixel to K standard "
               "deviations from the mean of its neighbours on the same surface, as 3.")
 @click.option("--name", metavar="NAME", help="Name of the results; default the method's.")
 @click.option("--list", "list_methods", is_flag=True, is_eager=True, expose_value=False,

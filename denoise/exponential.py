@@ -1,5 +1,6 @@
 """A fast power of two, for weights."""
 
+# pyright: standard
 from __future__ import annotations
 
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-Float = Any  # a one-dimensional array of drjit.llvm or drjit.cuda, known at run time
+from .arrays import Float
 
 # 2^f on [-1/2, 1/2] as a cubic: relative error below 8e-5.
 _EXP2 = (0.99992811, 0.69326099, 0.24261114, 0.05517166)

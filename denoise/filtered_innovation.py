@@ -62,7 +62,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class FilteredInnovation(OnLanes):
+class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     """The filtered innovation of visibility, glossy and diffuse light.
 
     Attributes:
@@ -131,11 +131,11 @@ class FilteredInnovation(OnLanes):
     def reach(self) -> int:
         return 1 << max(self.innovation_levels - 1, self.output_levels - 1, SPREAD_LEVEL)
 
-    def init_on(self, stencil: Stencil) -> RecordState:
+    def init_on(self, stencil: Stencil) -> RecordState[Passes]:
         return RecordState(stencil, no_history(stencil))
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,
-                 state: RecordState) -> tuple[Color, RecordState]:
+                 state: RecordState[Passes]) -> tuple[Color, RecordState[Passes]]:
         """`color` is used where the frame has no direct and indirect light."""
         stencil, previous, sample = state.stencil, state.previous or frame, surface.sample
         motion = motion_between(previous, frame, stencil)
@@ -202,12 +202,13 @@ class FilteredInnovation(OnLanes):
 
 @dataclass(frozen=True)
 class Level:
-    """A pass over the first planes: their taps and those of surfaces, and the recorded step."""
+    """A pass over the first planes: their taps and those of surfaces, and the recorded step, which
+    gives these planes."""
 
     values: Taps
     surfaces: Taps[SurfaceTap]
     spacing: Float
-    step: Step[..., Any]
+    step: Step[..., list[Float]]
     count: int
 
     @staticmethod
@@ -218,7 +219,8 @@ class Level:
         values = planes.taps(offsets, range(count))
         return Level(values.named(named) if named else values,
                      surfaces.taps(offsets, [inverse_depth, _ID]).named(SurfaceTap),
-                     planes.stencil.opaque(1 << i), Step(function), count)
+                     planes.stencil.opaque(1 << i),
+                     Step(lambda *a: arrays_of(function(*a))), count)
 
 
 _ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH = range(3)  # planes of the surface
@@ -300,6 +302,6 @@ class Passes:
         form, planes, _ = flatten(values)
         for level in levels:
             self.buffer.store(planes[:level.count], gutters=True)
-            planes[:level.count] = arrays_of(level.step(level.values, level.surfaces, plane,
-                                                        level.spacing, *arguments))
+            planes[:level.count] = level.step(level.values, level.surfaces, plane, level.spacing,
+                                              *arguments)
         return build(form, planes)

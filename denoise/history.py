@@ -12,7 +12,7 @@ Departure from SVGF: it tests the difference of depths, this the distance from t
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import drjit as dr
 
@@ -24,6 +24,8 @@ from .sparse import weighted_sums
 from .stencil import Stencil
 from .structure import arrays_of
 from .surface import SurfaceSample, dot
+
+PassesT = TypeVar("PassesT")
 
 WORDS = 16          # floats in a record, one cache line
 MOST_VALUES = 12
@@ -49,13 +51,13 @@ def pack_records(stencil: Stencil, surface: SurfaceSample, values: Any) -> Float
 
 
 @dataclass(frozen=True)
-class RecordState:
-    """A method's records of the previous frame and its matrices, and what it works with."""
+class RecordState(Generic[PassesT]):
+    """A method's records of the previous frame and its matrices, and its passes."""
 
     stencil: Stencil
     records: Float = field(repr=False)
     previous: Frame | None = None
-    passes: Any = None
+    passes: PassesT | None = None
 
 
 class LookUp(NamedTuple):

@@ -43,6 +43,7 @@ Our own, from a trial; the nearest published relatives are the fast and slow his
 the gradients of A-SVGF (Schied et al. 2018).
 """
 
+# pyright: standard
 from __future__ import annotations
 
 import math

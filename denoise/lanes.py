@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -14,7 +14,17 @@ from .stencil import Stencil
 from .surface import GUIDES, Surface, read_color, read_surface
 
 
-class OnLanes:
+class OnStencil(Protocol):
+    """State of a method."""
+
+    @property
+    def stencil(self) -> Stencil: ...
+
+
+State = TypeVar("State", bound=OnStencil)
+
+
+class OnLanes(Generic[State]):
     """A method whose kernels run over the lanes of a stencil, which its state holds.
 
     Attributes:
@@ -27,15 +37,15 @@ class OnLanes:
     def reach(self) -> int:
         raise NotImplementedError
 
-    def init(self, height: int, width: int) -> Any:
+    def init(self, height: int, width: int) -> State:
         """State before the first frame; InputError for an empty image."""
         return self.init_on(Stencil(height, width, self.reach))
 
-    def init_on(self, stencil: Stencil) -> Any:
+    def init_on(self, stencil: Stencil) -> State:
         """State on a stencil that reaches at least `reach` pixels."""
         raise NotImplementedError
 
-    def __call__(self, frame: Frame, state: Any) -> tuple[np.ndarray, Any]:
+    def __call__(self, frame: Frame, state: State) -> tuple[np.ndarray, State]:
         """(h, w, 3) denoised colour, nowhere negative, and the state for the next frame.
 
         Raises:
@@ -47,6 +57,6 @@ class OnLanes:
         return repay(state.stencil.image(result), frame["id"]), after
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,
-                 state: Any) -> tuple[Color, Any]:
+                 state: State) -> tuple[Color, State]:
         """The same from arrays of lanes to arrays of lanes, in place of the frame's colour."""
         raise NotImplementedError

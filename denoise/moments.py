@@ -17,87 +17,139 @@ Schied et al. 2018; the power of 10 from Quake II RTX.
 
 from __future__ import annotations
 
-from typing import Any
+from functools import reduce
+from operator import or_
+from typing import Any, NamedTuple
 
 import drjit as dr
 
 from .arrays import Float
+from .atrous import LuminanceColor
 from .exponential import exp2
 from .history import look_up
-from .reprojection import Motion, locate
-from .sparse import weighted_sums, window_taps
+from .reprojection import Motion, ReprojectionTests, locate
+from .sparse import tabulate, weighted_sums, window_taps
 from .stencil import Stencil
+from .structure import arrays_of
 from .surface import SurfaceSample
-from .wavelet import geometry_exponent
+from .wavelet import Geometry, Guides, geometry_exponent, guides_of
 
 FORGETTING = 10      # power of 1 - lambda that a length is multiplied by
 SHORT = 4.0          # frames of history from which on its moments give the variance
 RADIUS = 3           # pixels, of the window of the spatial estimate
-VALUES = 5           # a signal's in a record: r, l, b, m1, m2
+_COLOR, _MOMENTS = 3, 2
 
 
-def accumulate(stencil: Stencil, fallback: bool, signal: list[Float], surface: SurfaceSample,
-               motion: Motion, records: Float,
-               changes: list[Float], alphas: list[Float],
-               numbers: list[Float]) -> tuple[list[Float], list[Float], list[Float]]:
+class Moments(NamedTuple):
+    """m1 and m2."""
+
+    first: Float
+    second: Float
+
+
+class AccumulatedSignal(NamedTuple):
+    """A signal's means over its history."""
+
+    color: LuminanceColor
+    moments: Moments
+
+
+class Accumulated(NamedTuple):
+    """What a record holds: lengths, one for all signals or one of each, and the signals."""
+
+    lengths: list[Float]
+    signals: list[AccumulatedSignal]
+
+
+class AccumulationWeights(NamedTuple):
+    """Least weights of the current frame, alpha of each signal and of moments; longest history."""
+
+    alphas: list[Float]
+    alpha_moments: Float
+    max_history_length: Float
+
+
+def accumulate(stencil: Stencil, fallback: bool, signals: list[LuminanceColor],
+               surface: SurfaceSample, motion: Motion, records: Float, changes: list[Float],
+               weights: AccumulationWeights, tests: ReprojectionTests) -> Accumulated:
     """Blend with the history.
 
     Args:
-        signal: three arrays a signal. motion: of `reprojection.motion_between`.
-        records: `history.pack_records` of the lengths and `VALUES` a signal.
+        motion: of `reprojection.motion_between`.
+        records: `history.pack_records` of what this gave for the frame before, which may have
+            got other colours.
         changes: lambda of each signal, which then has a length of its own; or none.
-        alphas: of each signal. numbers: alpha_moments, max_history_length,
-            min_cosine, plane_tolerance.
-    Returns:
-        Colour (3 a signal), moments (2 a signal), lengths (1, or 1 a signal with `changes`).
     """
-    alpha_moments, max_history_length, min_cosine, tolerance = numbers
-    signals = [signal[i:i + 3] for i in range(0, len(signal), 3)]
-    place = locate(stencil, surface, motion, tolerance)
+    place = locate(stencil, surface, motion, tests.plane_tolerance)
     count = max(len(changes), 1)
-    old, found = look_up(stencil, place, records, count + VALUES * len(signals), min_cosine,
-                         fallback)
-    colors, moments, lengths = [], [], []
-    for s, (r, y, b) in enumerate(signals):
+    values, is_valid = look_up(stencil, place, records,
+                               count + (_COLOR + _MOMENTS) * len(signals), tests.min_cosine,
+                               fallback)
+    history = _accumulated(values, count)
+    lengths, blended = [], []
+    for s, (color, old) in enumerate(zip(signals, history.signals, strict=True)):
         if s < count:
             kept = (1 - changes[s])**FORGETTING if changes else 1
-            length = dr.minimum(dr.fma(old[s], kept, 1), max_history_length)
-            lengths.append(dr.select(found, length, 1))
+            length = dr.minimum(dr.fma(history.lengths[s], kept, 1), weights.max_history_length)
+            lengths.append(dr.select(is_valid, length, 1))
         fresh = 1 / lengths[-1]
-        weights = [dr.maximum(alphas[s], fresh)] * 3 + [dr.maximum(alpha_moments, fresh)] * 2
+        alpha, alpha_moments = (dr.maximum(a, fresh)
+                                for a in (weights.alphas[s], weights.alpha_moments))
         if changes:
-            weights = [dr.fma(changes[s], 1 - w, w) for w in weights]
-        before = old[count + VALUES * s:count + VALUES * (s + 1)]
-        mixed = [dr.select(found, dr.fma(w, n - o, o), n)
-                 for w, n, o in zip(weights, [r, y, b, y, y * y], before, strict=True)]
-        colors += mixed[:3]
-        moments += mixed[3:]
-    return colors, moments, lengths
+            alpha, alpha_moments = (dr.fma(changes[s], 1 - a, a) for a in (alpha, alpha_moments))
+        now = Moments(color.luminance, color.luminance * color.luminance)
+        blended.append(AccumulatedSignal(
+            LuminanceColor(*[dr.select(is_valid, dr.fma(alpha, n - o, o), n)
+                             for n, o in zip(color, old.color)]),
+            Moments(*[dr.select(is_valid, dr.fma(alpha_moments, n - o, o), n)
+                      for n, o in zip(now, old.moments)])))
+    return Accumulated(lengths, blended)
 
 
-def estimate_variances(stencil: Stencil, moments: list[Float], lengths: list[Float],
-                       guides: list[Float], table: list[Float],
-                       numbers: list[Float]) -> list[Float]:
-    """v of each signal; numbers: half_power, and the length from which on history gives it."""
-    half_power, enough = numbers
-    wanted = lengths[0] < enough
-    for h in lengths[1:]:
-        wanted |= h < enough
-    count, around = len(moments), window_taps(stencil, RADIUS, table[0])
+def _accumulated(values: list[Float], lengths: int) -> Accumulated:
+    """Of the values of a record."""
+    size = _COLOR + _MOMENTS
+    signals = [AccumulatedSignal(LuminanceColor(*values[i:i + _COLOR]),
+                                 Moments(*values[i + _COLOR:i + size]))
+               for i in range(lengths, len(values), size)]
+    return Accumulated(values[:lengths], signals)
+
+
+def tabulate_moments(stencil: Stencil, accumulated: Accumulated, guides: Guides) -> Float:
+    """The window's table: moments of each signal, then guides. Traced, not evaluated."""
+    return tabulate(stencil, arrays_of([s.moments for s in accumulated.signals], guides))
+
+
+def estimate_variances(stencil: Stencil, accumulated: Accumulated, geometry: Geometry,
+                       window_table: Float, min_temporal_length: Float,
+                       half_power: Float) -> list[Float]:
+    """v of each signal.
+
+    Args:
+        window_table: of `tabulate_moments`.
+        min_temporal_length: from which on history gives the variance, not the window.
+        half_power: of `wavelet.LevelWeights`.
+    """
+    lengths, signals = accumulated
+    is_short = [h < min_temporal_length for h in lengths]
+    active = reduce(or_, is_short)
+    count, around = _MOMENTS * len(signals), window_taps(stencil, RADIUS, window_table)
+    tolerance = geometry.tolerance
 
     def tap(i: Any) -> tuple[Float, list[Float]]:
         inside, dy, dx, words = around(i)
-        gradient = dr.abs(dr.fma(guides[4], dx, guides[5] * dy))
-        w = exp2(geometry_exponent(guides, words[count:count + 4], gradient, half_power))
+        gradient = dr.abs(dr.fma(tolerance.dx, dx, tolerance.dy * dy))
+        w = exp2(geometry_exponent(geometry, guides_of(*words[count:count + 4]), gradient,
+                                   half_power))
         return dr.select(inside, w, 0), words[:count]
 
-    total, sums = weighted_sums(stencil, wanted, (2 * RADIUS + 1)**2, count, tap)
-    norm = dr.select(wanted, 1 / dr.select(wanted, total, 1), 0)
+    total, sums = weighted_sums(stencil, active, (2 * RADIUS + 1)**2, count, tap)
+    norm = dr.select(active, 1 / dr.select(active, total, 1), 0)
     variances = []
-    for s in range(0, count, 2):
-        h = lengths[min(s // 2, len(lengths) - 1)]
-        m1, m2 = (dr.select(h < enough, a * norm, m)
-                  for a, m in zip(sums[s:s + 2], moments[s:s + 2]))
+    for s, signal in enumerate(signals):
+        of = min(s, len(lengths) - 1)
+        window = Moments(*sums[_MOMENTS * s:_MOMENTS * (s + 1)])
+        m1, m2 = (dr.select(is_short[of], w * norm, m) for w, m in zip(window, signal.moments))
         v = dr.fma(-m1, m1, m2)
-        variances.append(dr.select(v > 0, v, 0) * dr.maximum(1, SHORT / h))
+        variances.append(dr.select(v > 0, v, 0) * dr.maximum(1, SHORT / lengths[of]))
     return variances

@@ -143,7 +143,8 @@ def atrous(frame: Frame, levels: int = 5, sigma_luminance: float = 4, sigma_plan
 
 
 def clamp_box(color: np.ndarray, radius: int, k: float) -> tuple[np.ndarray, np.ndarray]:
-    """(low, high) of each pixel: mean -+ k deviations of the window's pixels inside the image."""
+    """(low, high) of each pixel: mean -+ k standard deviations of the window's pixels inside the
+    image."""
     h, w, _ = color.shape
     low, high = np.empty((h, w, 3)), np.empty((h, w, 3))
     for y in range(h):

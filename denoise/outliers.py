@@ -1,7 +1,7 @@
 """Outlier removal before the filter: a stage that any method can follow.
 
-Symbols: C a signal without texture, one channel; mu, sigma its mean and deviation over the pixels
-around that lie on the same surface (same object, near the tangent plane), itself left out;
+Symbols: C a signal without texture, one channel; mu, sigma its mean and standard deviation over the
+pixels around that lie on the same surface (same object, near the tangent plane), itself left out;
 k = outlier_width.
 
     C <- clamp(C, mu - k sigma, mu + k sigma)
@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 import drjit as dr
 import numpy as np
@@ -35,10 +35,17 @@ from .luminance import luminance
 from .parameters import check_positive, check_whole
 from .stencil import Offset, Planes, Stencil, Step, Taps, window
 from .structure import evaluate
-from .surface import GUIDES, check_size, read_surface, repair
+from .surface import GUIDES, TangentPlane, check_size, read_surface, repair
 
 FEWEST = 4
 _PARTS = ("direct", "indirect", "specular")
+
+
+class SurfaceTap(NamedTuple):
+    """What tells whether a pixel lies on the same surface: object ID and 1/z."""
+
+    id: Float
+    inverse_depth: Float
 
 
 @dataclass(frozen=True)
@@ -71,7 +78,8 @@ class RemoveOutliers:
         stencil = Stencil(height, width, self.outlier_radius)
         signal, guides = stencil.planes([0.0] * 3), stencil.planes([-2.0, 0.0])
         offsets = window(self.outlier_radius)
-        return OutlierState(stencil, signal, guides, signal.taps(offsets), guides.taps(offsets),
+        return OutlierState(stencil, signal, guides, signal.taps(offsets).named(Color),
+                            guides.taps(offsets).named(SurfaceTap),
                             Step(lambda *a: clamp(offsets, *a)))
 
     def __call__(self, frame: Frame, state: OutlierState) -> tuple[Frame, OutlierState]:
@@ -85,18 +93,19 @@ class RemoveOutliers:
         surface = read_surface(frame, stencil)
         scale = dr.select(surface.is_valid, dr.abs(surface.plane_distance)
                           * stencil.opaque(1 / self.outlier_plane), 1)
-        guides = [stencil.Float(surface.id), surface.inverse_depth, *surface.slope, scale]
-        evaluate(guides)
-        state.guides.store(guides[:2])
-        width = [stencil.opaque(self.outlier_width)]
+        id_ = stencil.Float(surface.id)
+        plane = TangentPlane(surface.inverse_depth, *surface.slope, scale)
+        evaluate(id_, plane)
+        state.guides.store(SurfaceTap(id_, plane.inverse_depth))
+        width = stencil.opaque(self.outlier_width)
         before = repair(np.asarray(frame["color"], np.float32), frame["id"])
         images, color = {}, before
         for name, given, texture in _lights(frame, before, stencil):
             light = texture.demodulate(Color(*stencil.load(given)))
             evaluate(light)
             state.signal.store(light)
-            light = state.clamp(state.signal_taps, state.guide_taps, light, guides, width)
-            images[name] = stencil.image(texture.modulate(Color(*light)))
+            light = state.clamp(state.signal_taps, state.guide_taps, light, id_, plane, width)
+            images[name] = stencil.image(texture.modulate(light))
             color = color + (images[name] - given)
         if "specular" in images:
             images["indirect"] = images["indirect"] + images["specular"]
@@ -118,9 +127,9 @@ class OutlierState:
     stencil: Stencil
     signal: Planes
     guides: Planes
-    signal_taps: Taps
-    guide_taps: Taps
-    clamp: Step[..., Any]
+    signal_taps: Taps[Color]
+    guide_taps: Taps[SurfaceTap]
+    clamp: Step[..., Color]
     before: float = 0.0
     after: float = 0.0
 
@@ -142,16 +151,19 @@ def _lights(frame: Frame, color: np.ndarray,
     yield "indirect", parts["indirect"], plain
 
 
-def clamp(offsets: list[Offset], signal: Taps, guides: Taps, center: list[Float],
-          center_guides: list[Float], width: list[Float]) -> list[Float]:
-    """Each channel within mu -+ k sigma of the window's pixels on the same surface."""
-    id_, inverse_depth, gx, gy, scale = center_guides
-    float_t = type(inverse_depth)
+def clamp(offsets: list[Offset], signal: Taps[Color], guides: Taps[SurfaceTap], center: Color,
+          id_: Float, plane: TangentPlane, width: Float) -> Color:
+    """Each channel within mu -+ k sigma of the window's pixels on the same surface.
+
+    Args:
+        center, id_, plane: of the pixel itself. width: k.
+    """
+    float_t = type(plane.inverse_depth)
     count, sums, squares = float_t(0), [float_t(0)] * 3, [float_t(0)] * 3
     for i, (dy, dx) in enumerate(offsets):
-        tap_id, tap_inverse_depth = guides.at(i)
-        expected = dr.fma(gx, float(dx), dr.fma(gy, float(dy), inverse_depth))
-        alike = (tap_id == id_) & (dr.abs(tap_inverse_depth - expected) * scale < 1)
+        tap = guides.at(i)
+        expected = dr.fma(plane.dx, float(dx), dr.fma(plane.dy, float(dy), plane.inverse_depth))
+        alike = (tap.id == id_) & (dr.abs(tap.inverse_depth - expected) * plane.scale < 1)
         count += dr.select(alike, float_t(1), 0)
         for c, value in enumerate(signal.at(i)):
             value = dr.select(alike, value, 0)
@@ -162,15 +174,29 @@ def clamp(offsets: list[Offset], signal: Taps, guides: Taps, center: list[Float]
     for value, total, square in zip(center, sums, squares, strict=True):
         mean = total / count
         variance = dr.fma(-mean, mean, square / count)
-        reach = width[0] * dr.sqrt(dr.select(variance > 0, variance, 0))
+        reach = width * dr.sqrt(dr.select(variance > 0, variance, 0))
         low, high = mean - reach, mean + reach
         clamped = dr.select(value < low, low, dr.select(value > high, high, value))
         result.append(dr.select(count >= FEWEST, clamped, value))
-    return result
+    return Color(*result)
+
+
+S = TypeVar("S")
+
+
+class _Method(Protocol[S]):
+    """What `methods.Method` says, with its state's type."""
+
+    @property
+    def needs(self) -> tuple[str, ...]: ...
+
+    def init(self, height: int, width: int) -> S: ...
+
+    def __call__(self, frame: Frame, state: S) -> tuple[np.ndarray, S]: ...
 
 
 @dataclass(frozen=True)
-class WithoutOutliers:
+class WithoutOutliers(Generic[S]):
     """A method that gets frames whose outliers were removed.
 
     Attributes:
@@ -178,7 +204,7 @@ class WithoutOutliers:
         outliers: the stage before it, a `RemoveOutliers`.
     """
 
-    method: Any
+    method: _Method[S]
     outliers: RemoveOutliers = field(default_factory=RemoveOutliers)
 
     @property
@@ -189,21 +215,21 @@ class WithoutOutliers:
     def uses(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys((*_PARTS, *getattr(self.method, "uses", ()))))
 
-    def init(self, height: int, width: int) -> Cleaned:
+    def init(self, height: int, width: int) -> Cleaned[S]:
         return Cleaned(self.outliers.init(height, width), self.method.init(height, width))
 
-    def __call__(self, frame: Frame, state: Cleaned) -> tuple[np.ndarray, Cleaned]:
+    def __call__(self, frame: Frame, state: Cleaned[S]) -> tuple[np.ndarray, Cleaned[S]]:
         frame, outliers = self.outliers(frame, state.outliers)
         image, inner = self.method(frame, state.inner)
         return image, Cleaned(outliers, inner)
 
 
 @dataclass(frozen=True)
-class Cleaned:
+class Cleaned(Generic[S]):
     """State of the stage and of the method after it."""
 
     outliers: OutlierState
-    inner: Any
+    inner: S
 
     @property
     def energy_kept(self) -> float:
@@ -211,6 +237,6 @@ class Cleaned:
         return self.outliers.after / self.outliers.before if self.outliers.before else 1.0
 
 
-def energy_kept(state: Any) -> float | None:
+def energy_kept(state: object) -> float | None:
     """`Cleaned.energy_kept`; None for a method without the stage."""
     return state.energy_kept if isinstance(state, Cleaned) else None

@@ -20,14 +20,22 @@ that noise would have rejected, and fewer across an edge.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from render.frame import Frame
 
 from .arrays import Color
-from .bilateral import OUTSIDE, Bilateral, add_row_of_taps
+from .bilateral import (
+    OUTSIDE,
+    Bilateral,
+    BilateralState,
+    Center,
+    TapLine,
+    WeightedColor,
+    add_taps,
+    no_taps,
+)
 from .demodulation import read_texture
-from .stencil import Planes, Stencil, Step, Taps
+from .stencil import Stencil, Step
 from .structure import evaluate
 from .surface import Surface
 
@@ -45,33 +53,29 @@ class BilateralSeparable(Bilateral):
         ((12, 16, 3), dtype('float32'))
     """
 
-    def init_on(self, stencil: Stencil) -> SeparableState:
+    def init_on(self, stencil: Stencil) -> BilateralState:
         planes = stencil.planes(OUTSIDE, aligned=True)
         window = range(-self.radius, self.radius + 1)
-        passes = [planes.taps([(0, dx) for dx in window]), planes.taps([(dy, 0) for dy in window])]
-        return SeparableState(stencil, planes, passes, [Step(add_row_of_taps) for _ in passes])
+        return BilateralState(stencil, planes, [
+            TapLine.make(planes, [(0, dx) for dx in window], 0, Step(add_taps)),
+            TapLine.make(planes, [(dy, 0) for dy in window], 0, Step(add_taps))])
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,
-                 state: SeparableState) -> tuple[Color, SeparableState]:
+                 state: BilateralState) -> tuple[Color, BilateralState]:
         stencil = state.stencil
         texture = read_texture(frame, stencil, self.demodulate)
-        center, weights = self.prepare(texture.demodulate(color), surface, state.planes)
-        for taps, step in zip(state.passes, state.steps, strict=True):
-            zeros = [stencil.constant(0) for _ in range(4)]
-            *sums, total = step(taps, center, zeros, [*weights, stencil.opaque(0)])
-            center = [s / total for s in sums] + center[3:]
-            if taps is not state.passes[-1]:
-                evaluate(center)
-                state.planes.store(center[:3])
+        center = self.prepare(texture.demodulate(color), surface, state.planes)
+        weights = self.weights(stencil)
+        along_row, along_column = state.lines
+        center = _with_mean(center, along_row.add(center, no_taps(stencil), weights))
+        evaluate(center.sample.color)
+        state.planes.store(center.sample.color)
+        center = _with_mean(center, along_column.add(center, no_taps(stencil), weights))
         scale = stencil.opaque(1 / self.color_scale)
-        return texture.modulate(Color(*[c * scale for c in center[:3]])), state
+        return texture.modulate(Color(*[c * scale for c in center.sample.color])), state
 
 
-@dataclass(frozen=True)
-class SeparableState:
-    """Planes as in `BilateralState`, their taps along a row and along a column."""
-
-    stencil: Stencil
-    planes: Planes
-    passes: list[Taps]
-    steps: list[Step[..., Any]]
+def _with_mean(center: Center, sums: WeightedColor) -> Center:
+    """The pixel with the mean of the taps in the place of its colour."""
+    mean = Color(*[s / sums.weight for s in sums.color])
+    return center._replace(sample=center.sample._replace(color=mean))

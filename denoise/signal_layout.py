@@ -9,6 +9,7 @@ the rule of its own `PlaneRule`, from which kernels are built.
 A record of the history holds the last signal first, so that visibility can be looked up alone.
 """
 
+# pyright: standard
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -26,7 +26,7 @@ import numpy as np
 from render.frame import Frame
 
 from .arrays import Color, Float
-from .atrous import with_green
+from .atrous import LuminanceColor, with_green
 from .demodulation import Texture, read_texture
 from .stencil import Stencil
 from .structure import arrays_of
@@ -76,9 +76,9 @@ class Signals:
     def color(self, signals: Sequence[Signal]) -> Color:
         """The colour that (filtered) signals make, in the order of `listed`."""
         by_kind = dict(zip(self.by_kind, signals, strict=True))
-        color = self.texture.modulate(with_green(arrays_of(by_kind[SignalKind.DIFFUSE])))
+        color = self.texture.modulate(_color(by_kind[SignalKind.DIFFUSE]))
         if SignalKind.GLOSSY in by_kind:
-            glossy = with_green(arrays_of(by_kind[SignalKind.GLOSSY]))
+            glossy = _color(by_kind[SignalKind.GLOSSY])
             color = Color(*[c + g for c, g in zip(color, glossy)])
         if self.unshadowed:
             visibility = by_kind[SignalKind.VISIBILITY].luminance
@@ -124,3 +124,7 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
 
 def _of_light(light: Color) -> Signal:
     return Signal(light.red, luminance(light), light.blue)
+
+
+def _color(light: Signal) -> Color:
+    return with_green(LuminanceColor(*arrays_of(light)))

@@ -4,6 +4,7 @@ A loop that the other lanes do not enter: a packet of lanes of which none is act
 taps are gathers, since a shifted view would be read by every lane.
 """
 
+# pyright: standard
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

@@ -17,6 +17,7 @@ A kernel's results are fresh arrays, one number a lane. `Planes.store` copies th
 scatter would cost five times as much, and in a frozen function it silently writes to a copy.
 """
 
+# pyright: standard
 from __future__ import annotations
 
 import gc
@@ -167,9 +168,14 @@ class Stencil:
             words += list(dr.gather(self.ArrayXf, packed, at, shape=(_GATHERED, self.lanes)))
         return words[:count]
 
-    def rows_around(self, arrays: Sequence[Float], margin: int) -> Taps[list[Float]]:
+    def rows_around(self, values: Any, margin: int) -> Taps[list[Float]]:
         """A kernel's results, evaluated over `margin` rows more on either side, seen from the
-        2 margin + 1 rows around each pixel: taps without a copy."""
+        2 margin + 1 rows around each pixel: taps without a copy.
+
+        Args:
+            values: a structure of arrays (`structure.py`), depth first.
+        """
+        arrays = arrays_of(values)
         starts = [row * self.stride for row in range(2 * margin + 1)]
         if self.layout == "gather":
             return self.gathers(arrays, starts, self.lanes)
@@ -337,6 +343,11 @@ def _listed(*planes: Float) -> list[Float]:
     return list(planes)
 
 
+def single(plane: Float) -> Float:
+    """For `Taps.named`, of taps of one plane."""
+    return plane
+
+
 class Step(Generic[P, R]):
     """A function of structures of Dr.Jit arrays and taps, recorded at its first call and replayed
     after that.
@@ -361,21 +372,22 @@ class Step(Generic[P, R]):
             seen = [a.seen_as(b) for a, b in zip(call.taps, taps, strict=True)]
             arguments = build(call.form, arrays, seen)
             results = flatten(traced(*arguments))
-            call.results[call.form] = results.form
+            call.results[call.number] = results.form
             return results.arrays
 
         self._call = call
-        self._frozen = dr.freeze(record, state_fn=lambda *_: call.form, warn_after=1000)
+        self._frozen: Any = dr.freeze(record, state_fn=lambda *_: call.number, warn_after=1000)
 
     def __call__(self, *arguments: P.args, **_: P.kwargs) -> R:
         call = self._call
         call.form, arrays, call.taps = flatten(arguments)
+        call.number = call.numbers.setdefault(call.form, len(call.numbers))
         try:
             with _no_collection():
                 results = self._frozen(arrays, [taps.arrays for taps in call.taps])
         finally:
             call.taps = []
-        return build(call.results[call.form], results)
+        return build(call.results[call.number], results)
 
     @property
     def recordings(self) -> int:
@@ -383,14 +395,17 @@ class Step(Generic[P, R]):
 
 
 class _Call:
-    """The call that is being made: its taps and form; and the form of the results by the form of
-    the arguments. Dr.Jit walks all that a recorded function's closure holds, at every call, but not
-    into an object such as this."""
+    """The call that is being made: its taps, its form, and the number of that among the forms seen,
+    for Dr.Jit walks what tells recordings apart; and the form of the results, by that number.
+    Dr.Jit walks all that a recorded function's closure holds, at every call, but not into an object
+    such as this."""
 
     def __init__(self) -> None:
         self.taps: list[Taps] = []
         self.form: Form = ()
-        self.results: dict[Form, Form] = {}
+        self.number = 0
+        self.numbers: dict[Form, int] = {}
+        self.results: dict[int, Form] = {}
 
 
 @contextmanager

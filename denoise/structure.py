@@ -6,6 +6,7 @@ without arrays, silently), and walks a list twice as fast as a dataclass. So str
 flat lists, each with a *form*, from which `build` makes the structure again.
 """
 
+# pyright: standard
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
@@ -50,6 +51,8 @@ def flatten(structure: Any) -> Flat:
 
 def build(form: Form, arrays: Iterable[Any], taps: Iterable[Any] = ()) -> Any:
     """The structure of this form with these arrays and taps."""
+    if form[0] is list and all(type(token) is int for token in form[1:]):
+        return list(arrays)  # of arrays alone, as most results are
     return _build(iter(form), iter(arrays), iter(taps))
 
 

@@ -18,31 +18,56 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from render.frame import Frame
 
 from .arrays import Color, Float
-from .atrous import EPSILON, LARGEST_LEVELS, LOG2E, luminance_scale, with_green
+from .atrous import (
+    LARGEST_LEVELS,
+    LOG2E,
+    LuminanceColor,
+    NoisyColor,
+    luminance_scale,
+    luminance_weight,
+    noisy_color,
+    with_green,
+    with_luminance,
+)
 from .demodulation import Texture, read_texture
 from .history import RecordState, no_history, pack_records
 from .lanes import OnLanes
-from .moments import SHORT, accumulate, estimate_variances
+from .moments import (
+    SHORT,
+    Accumulated,
+    AccumulationWeights,
+    accumulate,
+    estimate_variances,
+    tabulate_moments,
+)
 from .parameters import HISTORY_RENAMED, check_positive, check_range, check_whole
-from .reprojection import Motion, motion_between, without_images
-from .sparse import tabulate
-from .stencil import Planes, Stencil, Step, Taps, window
+from .reprojection import Motion, ReprojectionTests, motion_between, without_images
+from .stencil import Planes, Stencil, Step, Taps, single, window
 from .structure import evaluate
-from .surface import Surface, SurfaceSample, luminance, repair
-from .wavelet import OUTSIDE, filter_level, read_guides
+from .surface import Surface, SurfaceSample, repair
+from .wavelet import (
+    OUTSIDE,
+    Geometry,
+    Guides,
+    LevelWeights,
+    filter_level,
+    guides_of,
+    read_geometry,
+)
 
 SIGNALS = ("direct", "indirect")
+_VARIANCE = 3  # which plane of a `NoisyColor`
 
 
 @dataclass(frozen=True)
-class Svgf(OnLanes):
+class Svgf(OnLanes["RecordState[Passes]"]):
     """Accumulation over frames, then an a-trous filter guided by the variance (SVGF).
 
     The switches (true or false) are the method's parts, each of which can be left out.
@@ -105,147 +130,199 @@ class Svgf(OnLanes):
     def reach(self) -> int:
         return 2 << (self.levels - 1)
 
-    def init_on(self, stencil: Stencil) -> RecordState:
+    def init_on(self, stencil: Stencil) -> RecordState[Passes]:
         return RecordState(stencil, no_history(stencil))
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,
-                 state: Any) -> tuple[Color, Any]:
+                 state: RecordState[Passes]) -> tuple[Color, RecordState[Passes]]:
         """`color` is used where the frame is one signal."""
-        lights, texture = self.read_lights(frame, color, state.stencil)
-        filtered, state = self.filter_lights(frame, lights, surface, state, [])
-        return texture.modulate(added_up(filtered)), state
+        stencil, sample = state.stencil, surface.sample
+        motion = motion_between(state.previous or frame, frame, stencil)
+        light = self._demodulate(frame, color, stencil)
+        changes = self.shading_changes(frame, len(light.signals), state)
+        geometry = read_geometry(stencil, surface, self.sigma_depth)
+        weights = self._level_weights(stencil)
+        passes = self._passes(state, len(light.signals))
+        evaluate(light.signals, sample, geometry)
 
-    def read_lights(self, frame: Frame, color: Color,
-                    stencil: Stencil) -> tuple[list[Color], Texture]:
-        """The signals, (r, g, b) each, and what was taken out of their sum."""
-        texture = read_texture(frame, stencil, self.demodulate)
-        if not self.split or not all(name in frame for name in SIGNALS):
-            return [texture.demodulate(color)], texture
-        direct, indirect, emission = (
-            Color(*stencil.load(repair(np.asarray(frame[name], np.float32), frame["id"])))
-            if name in frame else None for name in (*SIGNALS, "emission"))
-        plain = Texture(texture.albedo)
-        return ([plain.demodulate(light) for light in (direct, indirect) if light],
-                Texture(texture.albedo, emission))
+        passes.guides.store(geometry.guides)
+        accumulated, window_table = passes.accumulate(
+            light.signals, sample, motion, state.records, geometry.guides, changes,
+            self._least_weights(stencil, len(light.signals)), self._tests(stencil))
+        variances = passes.estimate_variances(accumulated, geometry, window_table,
+                                              self._min_temporal_length(stencil),
+                                              weights.half_power)
+        filtered = passes.filter_levels(accumulated, variances, geometry, weights)
+        history = self._history(accumulated, filtered)
+        records = passes.pack(sample, history) if self.accumulate else state.records
+        return light.modulate(filtered.last_level), replace(
+            state, passes=passes, records=records, previous=without_images(frame))
+
+    def shading_changes(self, frame: Frame, count: int,
+                        state: RecordState[Passes]) -> list[Float]:
+        """lambda of each of `count` signals (see `moments.py`), or none, as here."""
+        return []
 
     def alphas(self, count: int) -> list[float]:
         """alpha of each signal."""
         return [self.alpha] * count
 
-    def filter_lights(self, frame: Frame, lights: Sequence[Color], surface: Surface,
-                      state: Any, changes: list[Float]) -> tuple[list[Color], Any]:
-        """Each signal (r, g, b) filtered, and the state for the next frame.
+    def _demodulate(self, frame: Frame, color: Color, stencil: Stencil) -> Light:
+        """The frame's light without texture, direct and indirect apart where it has them."""
+        texture = read_texture(frame, stencil, self.demodulate)
+        if not self.split or not all(name in frame for name in SIGNALS):
+            return Light([with_luminance(texture.demodulate(color))], texture)
+        direct, indirect, emission = (
+            Color(*stencil.load(repair(np.asarray(frame[name], np.float32), frame["id"])))
+            if name in frame else None for name in (*SIGNALS, "emission"))
+        plain = Texture(texture.albedo)
+        return Light([with_luminance(plain.demodulate(light))
+                      for light in (direct, indirect) if light],
+                     Texture(texture.albedo, emission))
 
-        changes: lambda of each signal (see `moments.py`), or none.
-        """
-        stencil = state.stencil
-        motion = motion_between(state.previous or frame, frame, stencil)
-        passes = state.passes
-        if passes is None or len(passes.filters) != len(lights):
-            passes = Passes.make(self, stencil, len(lights))
-        signal = [c for r, g, b in lights for c in (r, luminance([r, g, b]), b)]
-        near = surface.sample
-        guides = read_guides(stencil, surface, self.sigma_depth)
-        evaluate(signal, near, guides)
-        passes.guides.store(guides[:4])
-        numbers = [stencil.opaque(x) for x in (self.alpha_moments, self.max_history_length,
-                                               self.min_cosine, self.plane_tolerance)]
-        colors, moments, lengths, window = passes.accumulate(
-            signal, near, motion, state.records, guides, changes,
-            [stencil.opaque(a) for a in self.alphas(len(lights))], numbers)
-        half_power = stencil.opaque(LOG2E * self.normal_power / 2)
-        enough = stencil.opaque(SHORT if self.temporal_variance
-                                else 2 * self.max_history_length + 1)
-        variances = passes.estimate(moments, lengths, guides, [window], [half_power, enough])
-        numbers = [stencil.opaque(EPSILON), stencil.opaque(self.sigma_luminance / LOG2E),
-                   half_power]
-        lights, kept = [], []
-        for s, part in enumerate(passes.filters):
-            given = [*colors[3 * s:3 * s + 3], variances[s]]
-            first, last = part.apply(given, guides, numbers)
-            lights.append(with_green(last))
-            kept += (first if self.feedback else given)[:3]
-        records = state.records
-        if self.accumulate:
-            records = passes.pack(near, kept, moments, lengths)
-        return lights, replace(state, passes=passes, records=records,
-                               previous=without_images(frame))
+    def _passes(self, state: RecordState[Passes], count: int) -> Passes:
+        """Of `count` signals: made for the first frame, and where their number changes."""
+        if state.passes is None or len(state.passes.filters) != count:
+            return Passes.make(state.stencil, count, self.levels, self.fallback)
+        return state.passes
+
+    def _least_weights(self, stencil: Stencil, count: int) -> AccumulationWeights:
+        return AccumulationWeights([stencil.opaque(a) for a in self.alphas(count)],
+                                   stencil.opaque(self.alpha_moments),
+                                   stencil.opaque(self.max_history_length))
+
+    def _tests(self, stencil: Stencil) -> ReprojectionTests:
+        return ReprojectionTests(stencil.opaque(self.min_cosine),
+                                 stencil.opaque(self.plane_tolerance))
+
+    def _level_weights(self, stencil: Stencil) -> LevelWeights:
+        return LevelWeights(luminance_weight(stencil, self.sigma_luminance),
+                            stencil.opaque(LOG2E * self.normal_power / 2))
+
+    def _min_temporal_length(self, stencil: Stencil) -> Float:
+        """Length of history from which on its moments give the variance."""
+        return stencil.opaque(SHORT if self.temporal_variance
+                              else 2 * self.max_history_length + 1)
+
+    def _history(self, accumulated: Accumulated, filtered: FilteredColors) -> Accumulated:
+        """What the next frame blends with."""
+        if not self.feedback:
+            return accumulated
+        return accumulated._replace(signals=[
+            signal._replace(color=color)
+            for signal, color in zip(accumulated.signals, filtered.first_level, strict=True)])
 
 
-def added_up(lights: Sequence[Color]) -> Color:
-    """The sum of signals, (r, g, b) each."""
-    total = lights[0]
-    for light in lights[1:]:
-        total = Color(*[a + b for a, b in zip(total, light)])
-    return total
+@dataclass(frozen=True)
+class Light:
+    """A frame's light as signals without texture, traced and not yet evaluated; the texture."""
+
+    signals: list[LuminanceColor]
+    texture: Texture
+
+    def modulate(self, signals: Sequence[LuminanceColor]) -> Color:
+        """The colour that filtered signals make."""
+        total, *others = [with_green(signal) for signal in signals]
+        for light in others:
+            total = Color(*[a + b for a, b in zip(total, light)])
+        return self.texture.modulate(total)
+
+
+class Blended(NamedTuple):
+    """What is accumulated, and `tabulate_moments` of it."""
+
+    accumulated: Accumulated
+    window_table: Float
+
+
+class FilteredColors(NamedTuple):
+    """Each signal after the first level and after the last one."""
+
+    first_level: list[LuminanceColor]
+    last_level: list[LuminanceColor]
 
 
 @dataclass(frozen=True)
 class Passes:
-    """Planes of the guides (n, z), the recorded steps, and a filter for each signal."""
+    """The recorded steps, a filter for each signal, and the planes of `Guides` for all."""
 
     guides: Planes
-    accumulate: Step[..., Any]
-    estimate: Step[..., Any]
+    accumulate: Step[..., Blended]
+    estimate_variances: Step[..., list[Float]]
     filters: list[Levels]
-    pack: Step[..., Any]
+    pack: Step[..., Float]
 
     @staticmethod
-    def make(method: Svgf, stencil: Stencil, count: int) -> Passes:
+    def make(stencil: Stencil, count: int, levels: int, fallback: bool) -> Passes:
         guides = stencil.planes(OUTSIDE)
 
-        def blend(signal: list[Float], surface: SurfaceSample, motion: Motion,
-                  records: Float, guides: list[Float], *rest: list[Float]) -> Any:
-            colors, moments, lengths = accumulate(stencil, method.fallback, signal, surface,
-                                                  motion, records, *rest)
-            window = tabulate(stencil, [*moments, *guides[:4]])
-            evaluate(colors, moments, lengths, window)
-            return colors, moments, lengths, window
+        def blend(signals: list[LuminanceColor], surface: SurfaceSample, motion: Motion,
+                  records: Float, guides: Guides, changes: list[Float],
+                  weights: AccumulationWeights, tests: ReprojectionTests) -> Blended:
+            accumulated = accumulate(stencil, fallback, signals, surface, motion, records, changes,
+                                     weights, tests)
+            table = tabulate_moments(stencil, accumulated, guides)
+            evaluate(accumulated, table)
+            return Blended(accumulated, table)
 
-        def estimate(*arguments: Any) -> list[Float]:
-            return estimate_variances(stencil, *arguments)
+        return Passes(guides, Step(blend), Step(lambda *a: estimate_variances(stencil, *a)),
+                      [Levels.make(stencil, guides, levels) for _ in range(count)],
+                      Step(lambda *a: pack_records(stencil, *a)))
 
-        def pack(surface: SurfaceSample, colors: list[Float], moments: list[Float],
-                 lengths: list[Float]) -> Float:
-            values = [c for s in range(count)
-                      for c in (*colors[3 * s:3 * s + 3], *moments[2 * s:2 * s + 2])]
-            return pack_records(stencil, surface, [*lengths, *values])
+    def filter_levels(self, accumulated: Accumulated, variances: list[Float], geometry: Geometry,
+                      weights: LevelWeights) -> FilteredColors:
+        """The a-trous filter of each signal."""
+        first, last = [], []
+        for levels, signal, variance in zip(self.filters, accumulated.signals, variances,
+                                            strict=True):
+            a, b = levels.filter(NoisyColor(signal.color, variance), geometry, weights)
+            first.append(a.color)
+            last.append(b.color)
+        return FilteredColors(first, last)
 
-        return Passes(guides, Step(blend), Step(estimate),
-                     [Levels.make(stencil, guides, method.levels) for _ in range(count)],
-                     Step(pack))
+
+@dataclass(frozen=True)
+class Level:
+    """A level's taps, their distance in pixels, and the recorded steps."""
+
+    signal: Taps[NoisyColor]
+    guides: Taps[Guides]
+    spacing: Float
+    scale: Step[..., Float]
+    filter: Step[..., NoisyColor]
+
+    @staticmethod
+    def make(i: int, signal: Planes, guides: Planes) -> Level:
+        """Level i."""
+        offsets = [(dy << i, dx << i) for dy, dx in window(2)]
+        return Level(signal.taps(offsets).named(noisy_color),
+                     guides.taps(offsets).named(guides_of), signal.stencil.opaque(1 << i),
+                     Step(luminance_scale), Step(filter_level))
 
 
 @dataclass(frozen=True)
 class Levels:
-    """The a-trous filter of one signal: its planes (r, l, b, v), their taps and the steps."""
+    """The a-trous filter of one signal: planes of a `NoisyColor`, the variance of the 3x3 pixels
+    around, and the levels."""
 
     signal: Planes
-    blur_taps: Taps
-    level_taps: list[tuple[Taps, Taps]]
-    spacings: list[Float]
-    scale_steps: list[Step[..., Any]]
-    level_steps: list[Step[..., Any]]
+    blur_taps: Taps[Float]
+    levels: list[Level]
 
     @staticmethod
     def make(stencil: Stencil, guides: Planes, levels: int) -> Levels:
         signal = stencil.planes([0.0] * 4)
-        taps = []
-        for i in range(levels):
-            offsets = [(dy << i, dx << i) for dy, dx in window(2)]
-            taps.append((signal.taps(offsets), guides.taps(offsets)))
-        return Levels(signal, signal.taps(window(1), [3]), taps,
-                      [stencil.opaque(1 << i) for i in range(levels)],
-                      [Step(luminance_scale) for _ in taps], [Step(filter_level) for _ in taps])
+        return Levels(signal, signal.taps(window(1), [_VARIANCE]).named(single),
+                      [Level.make(i, signal, guides) for i in range(levels)])
 
-    def apply(self, signal: list[Float], guides: list[Float],
-              numbers: list[Float]) -> tuple[list[Float], list[Float]]:
-        """What the first and the last level give; numbers: eps, sigma_luminance, half_power."""
-        first = signal
-        for i, taps in enumerate(self.level_taps):
-            self.signal.store(signal)
-            scale = self.scale_steps[i](self.blur_taps, signal[3:], numbers)
-            signal = self.level_steps[i](*taps, signal, guides, [scale],
-                                         [self.spacings[i], numbers[2]])
-            first = signal if i == 0 else first
-        return first, signal
+    def filter(self, noisy: NoisyColor, geometry: Geometry,
+               weights: LevelWeights) -> tuple[NoisyColor, NoisyColor]:
+        """What the first level and the last one give."""
+        first = noisy
+        for i, level in enumerate(self.levels):
+            self.signal.store(noisy)
+            scale = level.scale(self.blur_taps, noisy.variance, weights.luminance)
+            noisy = level.filter(level.signal, level.guides, noisy, geometry, scale,
+                                 level.spacing, weights.half_power)
+            first = noisy if i == 0 else first
+        return first, noisy

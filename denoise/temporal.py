@@ -17,7 +17,7 @@ the corner of one colour in another is pulled towards the other. A wider box tra
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import NamedTuple
 
 import drjit as dr
 
@@ -37,11 +37,11 @@ from .reprojection import (
 from .stencil import Stencil, Step, Taps
 from .structure import evaluate
 from .surface import Surface, SurfaceSample
-from .window_moments import RowMoments, window_moments
+from .window_moments import RowMoments, RowPass, window_moments
 
 
 @dataclass(frozen=True)
-class Temporal(OnLanes):
+class Temporal(OnLanes["TemporalState"]):
     """Accumulation over frames, noisy or filtered, with the history clamped to a window.
 
     Attributes:
@@ -80,29 +80,45 @@ class Temporal(OnLanes):
         return self.clamp_radius
 
     def init_on(self, stencil: Stencil) -> TemporalState:
-        def blend(rows: Taps, *arguments: Any) -> tuple[Color, Float]:
-            return clamp_and_blend(stencil, self.nearest, rows, *arguments)
-
-        return TemporalState(stencil, RowMoments.make(stencil, self.clamp_radius), Step(blend))
+        nearest = self.nearest
+        return TemporalState(stencil, RowPass.make(stencil, self.clamp_radius),
+                             Step(lambda *a: clamp_and_blend(stencil, nearest, *a)))
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,
                  state: TemporalState) -> tuple[Color, TemporalState]:
-        stencil, previous = state.stencil, state.previous
-        sample = surface.sample
+        stencil, previous, sample = state.stencil, state.previous, surface.sample
         evaluate(color, sample)
-        if previous is None:
+        if previous is None or state.history is None:
             history = pack(stencil, color, sample)
             evaluate(history)
             return color, state.after(frame, history)
         moments = state.row_moments(color)
         motion = motion_between(previous, frame, stencil)  # while rows are being summed
-        numbers = [stencil.opaque(x) for x in (self.alpha, self.color_box)]
-        tests = ReprojectionTests(stencil.opaque(self.min_cosine),
-                                  stencil.opaque(self.plane_tolerance))
-        rows = stencil.rows_around(moments, self.clamp_radius)
-        result, history = state.blend(rows, color, sample, motion, state.history, tests,
-                                      numbers)
-        return result, state.after(frame, history)
+        rows = state.row_moments.rows_around(moments)
+        blended, history = state.clamp_and_blend(rows, color, sample, motion, state.history,
+                                                 self._tests(stencil), self._weights(stencil))
+        return blended, state.after(frame, history)
+
+    def _tests(self, stencil: Stencil) -> ReprojectionTests:
+        return ReprojectionTests(stencil.opaque(self.min_cosine),
+                                 stencil.opaque(self.plane_tolerance))
+
+    def _weights(self, stencil: Stencil) -> BlendWeights:
+        return BlendWeights(stencil.opaque(self.alpha), stencil.opaque(self.color_box))
+
+
+class BlendWeights(NamedTuple):
+    """alpha, and k, the width of the clamp in standard deviations."""
+
+    alpha: Float
+    color_box: Float
+
+
+class Blended(NamedTuple):
+    """The accumulated colour, and its records for the next frame (`reprojection.pack`)."""
+
+    color: Color
+    history: Float
 
 
 @dataclass(frozen=True)
@@ -110,8 +126,8 @@ class TemporalState:
     """The recorded steps, the previous frame's matrices and history."""
 
     stencil: Stencil
-    row_moments: RowMoments
-    blend: Step[..., Any]
+    row_moments: RowPass
+    clamp_and_blend: Step[..., Blended]
     previous: Frame | None = None
     history: Float | None = field(default=None, repr=False)
 
@@ -120,20 +136,20 @@ class TemporalState:
         return replace(self, previous=without_images(frame), history=history)
 
 
-def clamp_and_blend(stencil: Stencil, nearest: bool, rows: Taps, color: Color,
+def clamp_and_blend(stencil: Stencil, nearest: bool, rows: Taps[RowMoments], color: Color,
                     surface: SurfaceSample, motion: Motion, history: Float,
-                    tests: ReprojectionTests, numbers: list[Float]) -> tuple[Color, Float]:
+                    tests: ReprojectionTests, weights: BlendWeights) -> Blended:
     """Blend with the clamped history; rows: of `window_moments`."""
-    alpha, k = numbers
-    old, valid = reproject(stencil, surface, motion, history, tests, nearest)
+    alpha, k = weights
+    old, is_valid = reproject(stencil, surface, motion, history, tests, nearest)
     rows.next()
     mean, sigma = window_moments(stencil, rows)
     result = []
     for c in range(3):
         low, high = dr.fma(-k, sigma[c], mean[c]), dr.fma(k, sigma[c], mean[c])
         clamped = dr.select(old[c] < low, low, dr.select(old[c] > high, high, old[c]))
-        result.append(dr.select(valid, dr.fma(alpha, color[c] - clamped, clamped), color[c]))
+        result.append(dr.select(is_valid, dr.fma(alpha, color[c] - clamped, clamped), color[c]))
     blended = Color(*result)
     packed = pack(stencil, blended, surface)
     evaluate(blended, packed)
-    return blended, packed
+    return Blended(blended, packed)

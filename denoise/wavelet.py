@@ -18,58 +18,99 @@ Departures from SVGF (Schied et al. 2017):
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import drjit as dr
 
-from .atrous import LOG2E, SPLINE
+from .arrays import Float, Vector3
+from .atrous import LOG2E, SPLINE, LuminanceColor, LuminanceWeight, NoisyColor
 from .exponential import exp2
-from .stencil import Float, Stencil, Taps, window
+from .stencil import Stencil, Taps, window
 from .surface import Surface
 
 EPSILON_DEPTH = 1e-3
 _BACKGROUND = 1e20   # depth where there is no surface: far from any, so that its weight is 0
-OUTSIDE = [0.0, 0.0, 0.0, 1e26]  # n, z outside the image
+OUTSIDE = [0.0, 0.0, 0.0, 1e26]  # `Guides` outside the image
 
 
-def read_guides(stencil: Stencil, surface: Surface, sigma_depth: float) -> list[Float]:
-    """n (3), z, and what scales |dz|: sigma_depth / log2(e) times grad z (2), and eps_z z."""
-    float_t, exists = stencil.Float, surface.is_valid
-    normal = [dr.select(exists, n, m) for n, m in zip(surface.normal, (1, 0, 0))]
-    depth = dr.select(exists, surface.depth, float_t(_BACKGROUND))
-    scale = -stencil.opaque(sigma_depth / LOG2E) * dr.square(surface.depth)
-    slope = [dr.select(exists, scale * g, 0) for g in surface.slope]
-    return [*normal, depth, *slope, depth * (EPSILON_DEPTH / LOG2E)]
+class Guides(NamedTuple):
+    """What a tap is weighed by: n, (1, 0, 0) without a surface, and z, far away without one."""
+
+    normal: Vector3
+    depth: Float
 
 
-def geometry_exponent(center: list[Float], tap: list[Float], gradient: Float,
-                      half_power: Float) -> Float:
-    """log2 of the geometry weight; gradient: |grad z . (p - q)|, scaled as in `read_guides`."""
-    nx, ny, nz, depth, _, _, epsilon = center
-    t = dr.fma(-nx, tap[0], dr.fma(-ny, tap[1], dr.fma(-nz, tap[2], 1)))
-    e = -t * dr.fma(t, half_power, 2 * half_power)
-    return dr.fma(-dr.abs(tap[3] - depth), 1 / (gradient + epsilon), e)
+class DepthTolerance(NamedTuple):
+    """What divides |dz| in the log2 of a weight.
 
-
-def filter_level(signal: Taps, guides: Taps, center: list[Float], center_guides: list[Float],
-                 scale: list[Float], numbers: list[Float]) -> list[Float]:
-    """One level: filtered (r, l, b, v).
-
-    scale: `atrous.luminance_scale`; numbers: pixels between taps, log2(e) normal_power / 2.
+    Attributes:
+        dx, dy: sigma_depth / log2(e) times grad z, a pixel. constant: eps_z z / log2(e).
     """
-    spacing, half_power = numbers
-    (scale_of_l,) = scale
+
+    dx: Float
+    dy: Float
+    constant: Float
+
+
+class Geometry(NamedTuple):
+    """What a pixel weighs its taps with."""
+
+    guides: Guides
+    tolerance: DepthTolerance
+
+
+class LevelWeights(NamedTuple):
+    """How a level weighs differences: of luminance; of normals, by log2(e) normal_power / 2."""
+
+    luminance: LuminanceWeight
+    half_power: Float
+
+
+def read_geometry(stencil: Stencil, surface: Surface, sigma_depth: float) -> Geometry:
+    """Of each pixel; traced and not yet evaluated."""
+    float_t, is_valid = stencil.Float, surface.is_valid
+    normal = Vector3(*[dr.select(is_valid, n, m) for n, m in zip(surface.normal, (1, 0, 0))])
+    depth = dr.select(is_valid, surface.depth, float_t(_BACKGROUND))
+    scale = -stencil.opaque(sigma_depth / LOG2E) * dr.square(surface.depth)
+    dx, dy = (dr.select(is_valid, scale * slope, 0) for slope in surface.slope)
+    return Geometry(Guides(normal, depth),
+                    DepthTolerance(dx, dy, depth * (EPSILON_DEPTH / LOG2E)))
+
+
+def guides_of(nx: Float, ny: Float, nz: Float, depth: Float) -> Guides:
+    """Of planes side by side."""
+    return Guides(Vector3(nx, ny, nz), depth)
+
+
+def geometry_exponent(center: Geometry, tap: Guides, gradient: Float, half_power: Float) -> Float:
+    """log2 of the geometry weight; gradient: |grad z . (p - q)|, scaled as a `DepthTolerance`."""
+    n, depth = center.guides
+    t = dr.fma(-n.x, tap.normal.x, dr.fma(-n.y, tap.normal.y, dr.fma(-n.z, tap.normal.z, 1)))
+    e = -t * dr.fma(t, half_power, 2 * half_power)
+    return dr.fma(-dr.abs(tap.depth - depth), 1 / (gradient + center.tolerance.constant), e)
+
+
+def filter_level(signal: Taps[NoisyColor], guides: Taps[Guides], center: NoisyColor,
+                 geometry: Geometry, luminance_scale: Float, spacing: Float,
+                 half_power: Float) -> NoisyColor:
+    """One level.
+
+    Args:
+        center, geometry: of the pixel itself. luminance_scale: of `atrous.py`.
+        spacing: pixels between taps. half_power: of `LevelWeights`.
+    """
     h0 = SPLINE[0]**2
-    *color, v = center
+    color, v = center
     sums, v, total = [c * h0 for c in color], v * h0**2, type(spacing)(h0)
-    gx, gy = (g * spacing for g in center_guides[4:6])
+    dx_, dy_ = geometry.tolerance.dx * spacing, geometry.tolerance.dy * spacing
     for i, (dy, dx) in enumerate(window(2)):
-        *tap, tap_v = signal.at(i)
-        gradient = dr.abs(dr.fma(gx, float(dx), gy * float(dy)))
-        e = geometry_exponent(center_guides, guides.at(i), gradient, half_power)
+        tap, tap_variance = signal.at(i)
+        gradient = dr.abs(dr.fma(dx_, float(dx), dy_ * float(dy)))
+        e = geometry_exponent(geometry, guides.at(i), gradient, half_power)
         e += math.log2(SPLINE[abs(dy)] * SPLINE[abs(dx)])
-        w = exp2(dr.fma(-dr.abs(tap[1] - color[1]), scale_of_l, e))
+        w = exp2(dr.fma(-dr.abs(tap.luminance - color.luminance), luminance_scale, e))
         sums, total = [dr.fma(w, c, s) for c, s in zip(tap, sums)], total + w
-        v = dr.fma(w * w, tap_v, v)
+        v = dr.fma(w * w, tap_variance, v)
         signal.next()
     norm = 1 / total
-    return [*(s * norm for s in sums), v * norm * norm]
+    return NoisyColor(LuminanceColor(*[s * norm for s in sums]), v * norm * norm)

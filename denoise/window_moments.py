@@ -1,4 +1,4 @@
-"""Mean and deviation of a colour over the square window around each pixel.
+"""Mean and standard deviation of a colour over the square window around each pixel.
 
 First along rows, then along columns: 2 (2 r + 1) taps instead of (2 r + 1)^2. Only pixels inside
 the image count. Both passes add up differences from the pixel's own value, which is one of those
@@ -10,7 +10,7 @@ the variance of all is the mean of the rows' variances plus the variance of the 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 
@@ -19,28 +19,56 @@ from .stencil import Planes, Stencil, Step, Taps
 from .structure import evaluate
 
 
+class MeanVariance(NamedTuple):
+    """Of one component over a part of a row."""
+
+    mean: Float
+    variance: Float
+
+
+class RowMoments(NamedTuple):
+    """Of each component over the part of a row that is inside the window and the image."""
+
+    red: MeanVariance
+    green: MeanVariance
+    blue: MeanVariance
+
+
+class WindowMoments(NamedTuple):
+    """Of each component over the part of the window that is inside the image."""
+
+    mean: Color
+    standard_deviation: Color
+
+
 @dataclass(frozen=True)
-class RowMoments:
-    """The pass along rows: planes of the colour, their taps, and the recorded step."""
+class RowPass:
+    """The pass along rows: planes of the colour, their taps from left to right, and the recorded
+    step."""
 
     planes: Planes
-    taps: Taps
-    step: Step[..., Any]
+    taps: Taps[Color]
+    step: Step[..., RowMoments]
 
     @staticmethod
-    def make(stencil: Stencil, radius: int) -> RowMoments:
+    def make(stencil: Stencil, radius: int) -> RowPass:
         planes = stencil.planes([0.0] * 3)
         taps = planes.taps([(0, dx) for dx in range(-radius, radius + 1)], margin=radius)
-        return RowMoments(planes, taps, Step(lambda taps: row_moments(stencil, taps)))
+        return RowPass(planes, taps.named(Color), Step(lambda taps: row_moments(stencil, taps)))
 
-    def __call__(self, color: Color) -> list[Float]:
+    def __call__(self, color: Color) -> RowMoments:
         """`row_moments` of an evaluated colour, over `radius` rows more on either side."""
         self.planes.store(color)
         return self.step(self.taps)
 
+    def rows_around(self, moments: RowMoments) -> Taps[RowMoments]:
+        """What a call gave, from the topmost row of the window to the lowest."""
+        radius = len(self.taps) // 2
+        return self.planes.stencil.rows_around(moments, radius).named(_row_moments)
 
-def row_moments(stencil: Stencil, taps: Taps) -> list[Float]:
-    """(mean, variance) of each component over the part of a row inside the image.
+
+def row_moments(stencil: Stencil, taps: Taps[Color]) -> RowMoments:
+    """Moments along a row.
 
     Args:
         taps: the colour from left to right, the pixel itself in the middle.
@@ -57,22 +85,22 @@ def row_moments(stencil: Stencil, taps: Taps) -> list[Float]:
             total, squares = total + counted, dr.fma(d, counted, squares)
             taps.next()
         mean = total * norm
-        moments += [own + mean, dr.fma(-mean, mean, squares * norm)]
+        moments.append(MeanVariance(own + mean, dr.fma(-mean, mean, squares * norm)))
     evaluate(moments)
-    return moments
+    return RowMoments(*moments)
 
 
-def window_moments(stencil: Stencil, rows: Taps) -> tuple[list[Float], list[Float]]:
-    """Mean and deviation, three each; rows: `row_moments` from the topmost row to the lowest."""
+def window_moments(stencil: Stencil, rows: Taps[RowMoments]) -> WindowMoments:
+    """Moments over the window; rows: `row_moments` from the topmost row to the lowest."""
     row, _ = stencil.pixel()
     counts = _inside(stencil, stencil.Int(row), len(rows), stencil.height)
     norm = 1 / sum(counts[1:], counts[0])
-    means, deviations = [], []
+    means, standard_deviations = [], []
     for c in range(3):
-        own = rows.at(len(rows) // 2)[2 * c]
+        own = rows.at(len(rows) // 2)[c].mean
         total, squares, variances = (stencil.Float(0) for _ in range(3))
         for i, count in enumerate(counts):
-            mean, variance = rows.at(i)[2 * c:2 * c + 2]
+            mean, variance = rows.at(i)[c]
             d = mean - own
             counted = d * count
             total, squares = total + counted, dr.fma(d, counted, squares)
@@ -81,8 +109,12 @@ def window_moments(stencil: Stencil, rows: Taps) -> tuple[list[Float], list[Floa
         mean = total * norm
         variance = dr.fma(-mean, mean, (squares + variances) * norm)
         means.append(own + mean)
-        deviations.append(dr.sqrt(dr.select(variance > 0, variance, 0)))
-    return means, deviations
+        standard_deviations.append(dr.sqrt(dr.select(variance > 0, variance, 0)))
+    return WindowMoments(Color(*means), Color(*standard_deviations))
+
+
+def _row_moments(*planes: Float) -> RowMoments:
+    return RowMoments(*[MeanVariance(*planes[i:i + 2]) for i in (0, 2, 4)])
 
 
 def _inside(stencil: Stencil, position: Any, side: int, size: int) -> list[Float]:

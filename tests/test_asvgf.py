@@ -90,7 +90,7 @@ def test_five_frames_one_recording_a_step():
     frames = [with_change(f, 0.9) for f in moving(9, 11, count=5)]
     _, state = run_and_keep(Asvgf(levels=2), frames)
     steps = [*state.gradients.steps, state.gradients.spread, state.passes.accumulate,
-             state.passes.estimate, state.passes.pack]
+             state.passes.estimate_variances, state.passes.pack]
     assert [step.recordings for step in steps] == [1] * 7
 
 

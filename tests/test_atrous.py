@@ -107,7 +107,7 @@ def test_five_frames_one_recording_a_step():
     state = method.init(9, 11)
     for i in range(5):
         _, state = method(noisy(make_frame(9, 11), seed=i), state)
-    steps = [state.variance_step, *state.level_steps]
+    steps = [state.variance_step, *(level.step for level in state.levels)]
     assert [step.recordings for step in steps] == [1] * 4
 
 

@@ -94,7 +94,7 @@ def test_five_frames_one_recording():
     state = method.init(9, 11)
     for i in range(5):
         _, state = method(noisy(make_frame(9, 11), seed=i), state)
-    assert state.step.recordings == 1
+    assert {line.step.recordings for line in state.lines} == {1}
 
 
 def test_changed_parameters_compile_nothing():

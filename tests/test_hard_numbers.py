@@ -23,10 +23,11 @@ from hard_numbers import (
 from synthetic import make_frame, noisy, with_images
 
 from denoise import oracles
+from denoise.arrays import Color
 from denoise.methods import METHODS, build, parameters
 from denoise.stencil import Stencil
 from denoise.surface import repair
-from denoise.window_moments import RowMoments, window_moments
+from denoise.window_moments import RowPass, window_moments
 from render.channels import REPLAY
 from render.renderer import Renderer
 from scenes.hard import HARD
@@ -179,7 +180,8 @@ def test_the_variance_of_a_constant_window_survives_cancellation(spread):
     stencil = Stencil(15, 15, 3)
     lanes = [x + 0 for x in stencil.load(color)]
     dr.eval(lanes)
-    _, sigma = window_moments(stencil, stencil.rows_around(RowMoments.make(stencil, 3)(lanes), 3))
+    along_rows = RowPass.make(stencil, 3)
+    _, sigma = window_moments(stencil, along_rows.rows_around(along_rows(Color(*lanes))))
     low, high = oracles.clamp_box(color, 3, 1.0)
     assert abs(stencil.image(sigma) - (high - low) / 2).max() < 5e-4
     assert spread == 0 or (high - low).max() > 1e-3

@@ -376,7 +376,7 @@ def test_alignment_strides_and_shared_memory_of_the_input_do_not_matter():
     kinds[1] = with_images(kinds[1], color=np.asfortranarray(frame["color"]))
     result, state = run(*kinds)
     np.testing.assert_array_equal(result, expected)
-    assert state.history.blend.recordings == 1
+    assert state.history.clamp_and_blend.recordings == 1
     shared = np.repeat(np.full((9, 11, 1), 0.6, np.float32), 3, axis=2)
     aliased = with_images(frame, color=shared, normal=shared, albedo=shared)
     apart = with_images(frame, color=shared.copy(), normal=shared.copy(), albedo=shared.copy())

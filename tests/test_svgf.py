@@ -162,9 +162,9 @@ def test_texture_and_emission_come_back_as_they_were(options):
 def test_five_frames_one_recording_a_step():
     _, state = run_and_keep(Svgf(levels=3), moving(9, 11, count=6))
     passes = state.passes
-    steps = [passes.accumulate, passes.estimate, passes.pack]
+    steps = [passes.accumulate, passes.estimate_variances, passes.pack]
     for part in passes.filters:
-        steps += [*part.scale_steps, *part.level_steps]
+        steps += [step for level in part.levels for step in (level.scale, level.filter)]
     assert len(passes.filters) == 2
     assert [step.recordings for step in steps] == [1] * 15
 

@@ -5,9 +5,10 @@ from kernels import compiled, taking_turns
 from synthetic import make_frame, noisy, translation, turn, with_images
 
 from denoise import oracles
+from denoise.arrays import Color
 from denoise.stencil import Stencil
 from denoise.temporal import Temporal
-from denoise.window_moments import RowMoments, window_moments
+from denoise.window_moments import RowPass, window_moments
 from render.errors import InputError
 
 
@@ -23,8 +24,8 @@ def moments(color, radius):
     stencil = Stencil(height, width, radius)
     lanes = [x + 0 for x in stencil.load(color.astype(np.float32))]
     dr.eval(lanes)
-    mean, sigma = window_moments(
-        stencil, stencil.rows_around(RowMoments.make(stencil, radius)(lanes), radius))
+    along_rows = RowPass.make(stencil, radius)
+    mean, sigma = window_moments(stencil, along_rows.rows_around(along_rows(Color(*lanes))))
     return stencil.image(mean), stencil.image(sigma)
 
 
@@ -111,7 +112,7 @@ def test_five_frames_one_recording():
     for i in range(6):
         frame = noisy(make_frame(9, 11, index=i, camera=translation(0.1 * i, 0, 0)), seed=i)
         _, state = method(frame, state)
-    assert state.blend.recordings == 1
+    assert state.clamp_and_blend.recordings == 1
 
 
 def test_changed_parameters_compile_nothing():
