@@ -29,7 +29,7 @@ import onespp  # noqa: F401 - finds LLVM before anything imports Dr.Jit
 from denoise import hard as hard_study
 from denoise.ablation import ablate, variants
 from denoise.ablation import markdown as ablation_table
-from denoise.interleave import read_times, time_methods
+from denoise.interleave import time_methods
 from denoise.lead import markdown as lead_table
 from denoise.methods import METHODS, Method, build, parameters
 from denoise.peers import PEERS
@@ -37,6 +37,7 @@ from denoise.plot import plot_speed_against_error
 from denoise.score import score
 from denoise.scorecard import INPUT, MethodScore, Scores
 from denoise.stream import denoise_sequence
+from denoise.times import read_times
 from denoise.tonemap import TONE_MAP
 from render.arguments import parse_size
 from render.channels import REPLAY

@@ -64,15 +64,12 @@ PAIRS = {
     "normals": (block(), block(normals=-CORNERS)),
     "uv": (block(), block(uv=CORNERS[:, 1:])),
     "image": (textured(bitmap=np.zeros((2, 2, 3))), textured(bitmap=np.ones((2, 2, 3)))),
-    "an image of Pillow": tuple(textured(bitmap=Image.new("RGB", (2, 2), color))
-                                for color in ("red", "tan")),
     "an image of Mitsuba": tuple(textured(bitmap=mi.Bitmap(np.full((2, 2, 3), v, np.float32)))
                                  for v in (0.2, 0.3)),
     "filter": (textured(bitmap=np.zeros((2, 2, 3))),
                textured(bitmap=np.zeros((2, 2, 3)), filter_type="nearest")),
     "sides": (with_floor(material={"type": "twosided", "front": A, "back": B}),
               with_floor(material={"type": "twosided", "back": B, "front": A})),
-    "nesting": (with_floor(material={"a": [[1], 2]}), with_floor(material={"a": [[1, 2]]})),
     "name": (with_floor(), with_floor(name="ground")),
 }
 
