@@ -1,4 +1,4 @@
-"""`python -m denoise.ablation DIR...`: what each part of a method is worth, as a Markdown table.
+"""`python -m onespp.denoise.ablation DIR...`: what each part of a method is worth, as a Markdown table.
 
 A part is a parameter that is true or false; each row turns one of them to what it is not by
 default. Nothing is written: frames are denoised in memory, all variants side by side.
@@ -14,10 +14,10 @@ from typing import Any
 
 import click
 
-from render.command import device_option, threads_option, use
-from render.errors import InputError
-from render.sequence import Sequence
-from render.terminal import progress, run
+from onespp.render.command import device_option, threads_option, use
+from onespp.render.errors import InputError
+from onespp.render.sequence import Sequence
+from onespp.render.terminal import progress, run
 
 from .ground import read_ground
 from .judge import Judge
@@ -126,4 +126,4 @@ def ablation(folders: tuple[Path, ...], method: str, device: str, threads: int |
 
 
 if __name__ == "__main__":
-    run(ablation, name="python -m denoise.ablation")
+    run(ablation, name="python -m onespp.denoise.ablation")

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Generic
 
-from render.frame import Frame
+from onespp.render.frame import Frame
 
 from .arrays import Color
 from .atrous import Atrous, AtrousState

@@ -26,8 +26,8 @@ from typing import ClassVar, NamedTuple
 import drjit as dr
 import numpy as np
 
-from render.channels import REPLAY
-from render.frame import Frame
+from onespp.render.channels import REPLAY
+from onespp.render.frame import Frame
 
 from .arrays import Float
 from .atrous import LARGEST_LEVELS, SPLINE

@@ -17,9 +17,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from render.errors import InputError
-from render.manifest import first_difference
-from render.sequence import Sequence
+from onespp.render.errors import InputError
+from onespp.render.manifest import first_difference
+from onespp.render.sequence import Sequence
 
 from .metrics import pair, reference_floor
 from .scorecard import INPUT, ErrorSplit

@@ -28,7 +28,7 @@ from typing import NamedTuple
 
 import drjit as dr
 
-from render.frame import Frame
+from onespp.render.frame import Frame
 
 from .arrays import Color, Float, Vector3
 from .demodulation import read_texture

@@ -10,13 +10,13 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
-from render.channels import REPLAY, SPLIT
-from render.command import device_option, threads_option, use
-from render.errors import InputError
-from render.games202_files import gaps
-from render.lock import writing
-from render.sequence import Sequence
-from render.terminal import command_line, note, progress
+from onespp.render.channels import REPLAY, SPLIT
+from onespp.render.command import device_option, threads_option, use
+from onespp.render.errors import InputError
+from onespp.render.games202_files import gaps
+from onespp.render.lock import writing
+from onespp.render.sequence import Sequence
+from onespp.render.terminal import command_line, note, progress
 
 from .parameters import pairs
 

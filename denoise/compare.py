@@ -25,8 +25,8 @@ from pydantic import FiniteFloat
 from rich.console import Console
 from rich.table import Table
 
-from render.errors import InputError
-from render.json_file import JsonFile, format_json
+from onespp.render.errors import InputError
+from onespp.render.json_file import JsonFile, format_json
 
 from .means import identical
 from .metrics import Metric

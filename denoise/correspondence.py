@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from render.frame import Frame
+from onespp.render.frame import Frame
 
 from .view import camera_from_screen, world_motions
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from statistics import median
 from typing import Any
 
-from render.manifest import Run
-from render.sequence import Sequence
+from onespp.render.manifest import Run
+from onespp.render.sequence import Sequence
 
 from .parameters import present_parameters
 from .times import Times

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import drjit as dr
 import numpy as np
 
-from render.frame import Frame
+from onespp.render.frame import Frame
 
 from .arrays import Bool, Color
 from .stencil import Stencil

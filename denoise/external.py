@@ -14,12 +14,12 @@ import tempfile
 import time
 from pathlib import Path
 
-from render.errors import InputError
-from render.games202 import export_games202, import_result
-from render.machine import machine
-from render.manifest import Run, check_result_name
-from render.sequence import Sequence
-from render.terminal import readable
+from onespp.render.errors import InputError
+from onespp.render.games202 import export_games202, import_result
+from onespp.render.machine import machine
+from onespp.render.manifest import Run, check_result_name
+from onespp.render.sequence import Sequence
+from onespp.render.terminal import readable
 
 from .methods import check_not_a_method
 

@@ -17,8 +17,8 @@ from typing import Any, ClassVar, TypeVar
 
 import drjit as dr
 
-from render.channels import SHADOW
-from render.frame import Frame
+from onespp.render.channels import SHADOW
+from onespp.render.frame import Frame
 
 from .arrays import Bool, Color, Float, Vector3
 from .atrous import BACKGROUND, LARGEST_LEVELS, LOG2E

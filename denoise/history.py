@@ -16,7 +16,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import drjit as dr
 
-from render.frame import Frame
+from onespp.render.frame import Frame
 
 from .arrays import Bool, Float, Vector3
 from .reprojection import LEAST_WEIGHT, Place

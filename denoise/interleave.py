@@ -13,12 +13,12 @@ from functools import partial
 import drjit as dr
 import numpy as np
 
-from render import backend
-from render.atomic import write_text
-from render.errors import InputError
-from render.json_file import format_json
-from render.machine import machine
-from render.sequence import Sequence
+from onespp.render import backend
+from onespp.render.atomic import write_text
+from onespp.render.errors import InputError
+from onespp.render.json_file import format_json
+from onespp.render.machine import machine
+from onespp.render.sequence import Sequence
 
 from .methods import Method, channels_read, parameters
 from .times import MethodTime, Times

@@ -6,7 +6,7 @@ from typing import ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
-from render.frame import Frame
+from onespp.render.frame import Frame
 
 from .arrays import Color
 from .debts import repay

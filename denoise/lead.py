@@ -1,4 +1,4 @@
-"""`python -m denoise.lead PLAIN OURS ...`: how far a method is ahead of a peer, as Markdown.
+"""`python -m onespp.denoise.lead PLAIN OURS ...`: how far a method is ahead of a peer, as Markdown.
 
 For each scene two scored folders: frames of the plain estimator, which any renderer gives, and of
 ours; the peer gets both inputs, the method the second. Everything is read from their scores.json.
@@ -12,8 +12,8 @@ from pathlib import Path
 
 import click
 
-from render.errors import InputError
-from render.terminal import run
+from onespp.render.errors import InputError
+from onespp.render.terminal import run
 
 from .scorecard import MethodScore, Scores, read_scores
 
@@ -119,4 +119,4 @@ def lead(folders: tuple[Path, ...], method: str, peer: str) -> None:
 
 
 if __name__ == "__main__":
-    run(lead, name="python -m denoise.lead")
+    run(lead, name="python -m onespp.denoise.lead")

@@ -19,8 +19,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from render.errors import InputError
-from render.frame import Frame
+from onespp.render.errors import InputError
+from onespp.render.frame import Frame
 
 from .assignment import Assignment, AssignmentAtrous
 from .asvgf import Asvgf

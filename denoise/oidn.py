@@ -18,8 +18,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from render.errors import InputError
-from render.frame import Frame
+from onespp.render.errors import InputError
+from onespp.render.frame import Frame
 
 from .parameters import check_choice
 from .surface import repair

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from render.frame import Frame
+from onespp.render.frame import Frame
 
 Weight = Callable[[int, int, "Pixels", "Pixels"], np.ndarray]
 

@@ -27,7 +27,7 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 import drjit as dr
 import numpy as np
 
-from render.frame import Frame
+from onespp.render.frame import Frame
 
 from .arrays import Color, Float
 from .demodulation import Texture, read_texture

@@ -8,7 +8,7 @@ from dataclasses import fields, is_dataclass
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from render.errors import InputError
+from onespp.render.errors import InputError
 
 T = TypeVar("T")
 

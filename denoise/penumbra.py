@@ -25,7 +25,7 @@ from typing import NamedTuple
 import drjit as dr
 import numpy as np
 
-from render.frame import Frame
+from onespp.render.frame import Frame
 
 from .arrays import Bool, Float
 from .stencil import Stencil

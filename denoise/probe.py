@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from render.frame import Frame
+from onespp.render.frame import Frame
 
 _WALL = np.array([0.3, 0.1, -1.0]) / np.linalg.norm([0.3, 0.1, -1.0])
 _SQUARE = np.array([0.0, 0.0, -1.0])

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from render.manifest import Run
-from render.sequence import Sequence
+from onespp.render.manifest import Run
+from onespp.render.sequence import Sequence
 
 from .parameters import present_parameters
 from .scorecard import INPUT, Scores

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from render.atomic import write_text
-from render.errors import InputError
-from render.manifest import format_frames
-from render.sequence import Reference, Sequence
+from onespp.render.atomic import write_text
+from onespp.render.errors import InputError
+from onespp.render.manifest import format_frames
+from onespp.render.sequence import Reference, Sequence
 
 from .bias import split_errors
 from .cost import cost

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 
-from render.lock import writing
-from render.sequence import Sequence
-from render.terminal import command_line, named_progress
+from onespp.render.lock import writing
+from onespp.render.sequence import Sequence
+from onespp.render.terminal import command_line, named_progress
 
 from .json_option import json_option, show_or_print
 

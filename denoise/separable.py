@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from render.frame import Frame
+from onespp.render.frame import Frame
 
 from .arrays import Color
 from .bilateral import (

@@ -26,8 +26,8 @@ from typing import Any, NamedTuple
 import drjit as dr
 import numpy as np
 
-from render.channels import SHADOW
-from render.frame import Frame
+from onespp.render.channels import SHADOW
+from onespp.render.frame import Frame
 
 from .arrays import Bool, Float, Matrix3, Vector3
 from .history import look_up

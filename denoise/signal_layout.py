@@ -16,8 +16,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeVar
 
-from render.errors import InputError
-from render.frame import Frame
+from onespp.render.errors import InputError
+from onespp.render.frame import Frame
 
 from .arrays import Float
 from .shadow_motion import CHOICE_LEVELS

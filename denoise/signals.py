@@ -23,7 +23,7 @@ from typing import NamedTuple
 import drjit as dr
 import numpy as np
 
-from render.frame import Frame
+from onespp.render.frame import Frame
 
 from .arrays import Color, Float
 from .atrous import LuminanceColor, with_green

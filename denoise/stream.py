@@ -18,22 +18,15 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from render import backend
-from render.frame import Frame
-from render.machine import machine
-from render.manifest import Run, check_result_name
-from render.sequence import Sequence
-from render.versions import versions
+from onespp.render import backend
+from onespp.render.frame import Frame
+from onespp.render.machine import machine
+from onespp.render.manifest import Run, check_result_name
+from onespp.render.sequence import Sequence
+from onespp.render.versions import versions
 
 from .memory import PeakMemory
-from .methods import (
-    Method,
-    changed,
-    channels_read,
-    check_not_a_method,
-    name_of,
-    parameters,
-)
+from .methods import Method, changed, channels_read, check_not_a_method, name_of, parameters
 from .outliers import energy_kept
 from .parameters import present_parameters
 from .timing import timed

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 
-from render.channels import CHANNELS
-from render.sequence import Sequence
+from onespp.render.channels import CHANNELS
+from onespp.render.sequence import Sequence
 
 from .classes import CAUSES, HISTORIES
 from .metrics import HEADLINE, PSNR_CAP, Metric

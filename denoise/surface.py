@@ -20,8 +20,8 @@ from typing import NamedTuple
 import drjit as dr
 import numpy as np
 
-from render.errors import InputError
-from render.frame import Frame
+from onespp.render.errors import InputError
+from onespp.render.frame import Frame
 
 from .arrays import Bool, Color, Float, Matrix3, Vector3
 from .stencil import Stencil

@@ -22,7 +22,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from render.frame import Frame
+from onespp.render.frame import Frame
 
 from .arrays import Color, Float
 from .atrous import (
@@ -52,15 +52,7 @@ from .reprojection import Motion, ReprojectionTests, motion_between, without_ima
 from .stencil import Planes, Stencil, Step, Taps, single, window
 from .structure import evaluate
 from .surface import Surface, SurfaceSample, repair
-from .wavelet import (
-    OUTSIDE,
-    Geometry,
-    Guides,
-    LevelWeights,
-    filter_level,
-    guides_of,
-    read_geometry,
-)
+from .wavelet import OUTSIDE, Geometry, Guides, LevelWeights, filter_level, guides_of, read_geometry
 
 SIGNALS = ("direct", "indirect")
 _VARIANCE = 3  # which plane of a `NoisyColor`

@@ -21,19 +21,12 @@ from typing import NamedTuple
 
 import drjit as dr
 
-from render.frame import Frame
+from onespp.render.frame import Frame
 
 from .arrays import Color, Float
 from .lanes import OnLanes
 from .parameters import check_positive, check_range, check_whole
-from .reprojection import (
-    Motion,
-    ReprojectionTests,
-    motion_between,
-    pack,
-    reproject,
-    without_images,
-)
+from .reprojection import Motion, ReprojectionTests, motion_between, pack, reproject, without_images
 from .stencil import Stencil, Step, Taps
 from .structure import evaluate
 from .surface import Surface, SurfaceSample

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from render.command import device_option, threads_option, use
-from render.errors import InputError
-from render.sequence import Sequence
-from render.terminal import note, progress
+from onespp.render.command import device_option, threads_option, use
+from onespp.render.errors import InputError
+from onespp.render.sequence import Sequence
+from onespp.render.terminal import note, progress
 
 from .parameters import pairs, renamed_parameters, with_present_names
 from .tonemap import TONE_MAP

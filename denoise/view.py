@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from render.errors import InputError
-from render.frame import Frame
+from onespp.render.errors import InputError
+from onespp.render.frame import Frame
 
 
 def camera_from_screen(frame: Frame) -> np.ndarray:

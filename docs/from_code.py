@@ -20,15 +20,15 @@ from typing import Any
 import click
 from draw_architecture import imports, modules, rooms, rooms_table, svg
 
-from denoise.classes import CAUSES, HISTORIES
-from denoise.methods import METHODS, build
-from denoise.outliers import RemoveOutliers
-from denoise.peers import PEERS
-from denoise.stability import MEASURES
 from onespp import app
-from render.channels import CHANNELS
-from scenes import catalog
-from scenes.hard import HARD
+from onespp.denoise.classes import CAUSES, HISTORIES
+from onespp.denoise.methods import METHODS, build
+from onespp.denoise.outliers import RemoveOutliers
+from onespp.denoise.peers import PEERS
+from onespp.denoise.stability import MEASURES
+from onespp.render.channels import CHANNELS
+from onespp.scenes import catalog
+from onespp.scenes.hard import HARD
 
 HEADER = re.compile(r"^(Sources?|Departures|Symbols)\b.*:", re.M)
 RANGE = re.compile(r"^(?:(?:above|at least) )?[-+.\deE]+(?: to [-+.\deE]+)?$")

@@ -26,30 +26,30 @@ import click
 import numpy as np
 
 import onespp  # noqa: F401 - finds LLVM before anything imports Dr.Jit
-from denoise import hard as hard_study
-from denoise.ablation import ablate, variants
-from denoise.ablation import markdown as ablation_table
-from denoise.interleave import time_methods
-from denoise.lead import markdown as lead_table
-from denoise.methods import METHODS, Method, build, parameters
-from denoise.peers import PEERS
-from denoise.plot import plot_speed_against_error
-from denoise.score import score
-from denoise.scorecard import INPUT, MethodScore, Scores
-from denoise.stream import denoise_sequence
-from denoise.times import read_times
-from denoise.tonemap import TONE_MAP
-from render.arguments import parse_size
-from render.channels import REPLAY
-from render.command import use
-from render.errors import InputError
-from render.job import RenderJob, render_sequence
-from render.lock import writing
-from render.manifest import format_frames, parse_frames
-from render.sequence import Sequence as FrameSequence
-from render.terminal import run as run_command
-from scenes import catalog
-from scenes.hard import HARD
+from onespp.denoise import hard as hard_study
+from onespp.denoise.ablation import ablate, variants
+from onespp.denoise.ablation import markdown as ablation_table
+from onespp.denoise.interleave import time_methods
+from onespp.denoise.lead import markdown as lead_table
+from onespp.denoise.methods import METHODS, Method, build, parameters
+from onespp.denoise.peers import PEERS
+from onespp.denoise.plot import plot_speed_against_error
+from onespp.denoise.score import score
+from onespp.denoise.scorecard import INPUT, MethodScore, Scores
+from onespp.denoise.stream import denoise_sequence
+from onespp.denoise.times import read_times
+from onespp.denoise.tonemap import TONE_MAP
+from onespp.render.arguments import parse_size
+from onespp.render.channels import REPLAY
+from onespp.render.command import use
+from onespp.render.errors import InputError
+from onespp.render.job import RenderJob, render_sequence
+from onespp.render.lock import writing
+from onespp.render.manifest import format_frames, parse_frames
+from onespp.render.sequence import Sequence as FrameSequence
+from onespp.render.terminal import run as run_command
+from onespp.scenes import catalog
+from onespp.scenes.hard import HARD
 
 ROOT = Path(__file__).resolve().parents[1]
 PLAIN, OURS = ("mis", "pcg"), ("resampled", "zsobol")  # --direct and --sampler

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from scenes.box import box
-from scenes.description import Scene, Shape
+from onespp.scenes.box import box
+from onespp.scenes.description import Scene, Shape
 
 PACE = 0.25
 

@@ -3,12 +3,12 @@
 import math
 from dataclasses import replace
 
-from scenes.animation import Animation
-from scenes.box import box
-from scenes.cameras import orbit
-from scenes.description import Camera, Rectangle, Scene, Shape
-from scenes.materials import diffuse
-from scenes.transforms import rotate, scale, translate
+from onespp.scenes.animation import Animation
+from onespp.scenes.box import box
+from onespp.scenes.cameras import orbit
+from onespp.scenes.description import Camera, Rectangle, Scene, Shape
+from onespp.scenes.materials import diffuse
+from onespp.scenes.transforms import rotate, scale, translate
 
 
 def scene() -> Scene:

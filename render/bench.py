@@ -1,4 +1,4 @@
-"""`python -m render.bench SCENE`: a frame with all channels against Mitsuba's `aov` around `path`.
+"""`python -m onespp.render.bench SCENE`: a frame with all channels against Mitsuba's `aov` around `path`.
 
 The same channels at 512x512 and 1 spp, in turns, after a warm-up; medians.
 """
@@ -12,7 +12,7 @@ import click
 import drjit as dr
 import numpy as np
 
-from scenes import catalog
+from onespp.scenes import catalog
 
 from .renderer import Renderer
 from .terminal import run
@@ -59,4 +59,4 @@ def bench(scene: str, side: int, repeats: int) -> None:
 
 
 if __name__ == "__main__":
-    run(bench, name="python -m render.bench")
+    run(bench, name="python -m onespp.render.bench")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from scenes import catalog
+from onespp.scenes import catalog
 
 from . import backend
 from .arguments import parse_size

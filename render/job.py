@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from scenes.description import Scene
-from scenes.fingerprint import fingerprint, later_fingerprints
+from onespp.scenes.description import Scene
+from onespp.scenes.fingerprint import fingerprint, later_fingerprints
 
 from . import backend
 from .errors import InputError

@@ -21,9 +21,9 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from scenes import validity
-from scenes.description import SceneError
-from scenes.validity import Place
+from onespp.scenes import validity
+from onespp.scenes.description import SceneError
+from onespp.scenes.validity import Place
 
 from .variant import mi
 
@@ -141,7 +141,7 @@ def _survivable(value: Mapping[str, Any], what: str) -> None:
                              "a weight")
     if kind in ("volume", "mesh_attribute"):
         raise SceneError(f"{what} is a {kind} texture, and shapes here carry no such data: use an "
-                         "image, or scenes.materials.palette")
+                         "image, or onespp.scenes.materials.palette")
 
 
 def _read(filename: Any, what: str, bounds: validity.Bounds) -> np.ndarray:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import drjit as dr
 import numpy as np
 
-from scenes.description import Camera
+from onespp.scenes.description import Camera
 
 from .stage import Stage
 from .variant import mi

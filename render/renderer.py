@@ -8,7 +8,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from scenes.description import Scene
+from onespp.scenes.description import Scene
 
 from .channels import FRAME, GLOSS, RADIANCE, REPLAY, SHADOW, SPLIT
 from .errors import InputError

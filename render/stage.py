@@ -19,7 +19,16 @@ from typing import Any, cast
 import drjit as dr
 import numpy as np
 
-from scenes.description import Cylinder, Disk, Mesh, Rectangle, Scene, SceneError, Shape, Sphere
+from onespp.scenes.description import (
+    Cylinder,
+    Disk,
+    Mesh,
+    Rectangle,
+    Scene,
+    SceneError,
+    Shape,
+    Sphere,
+)
 
 from . import plugins
 from .appearance import Appearance

@@ -176,7 +176,7 @@ def run(command: click.Command, arguments: Sequence[str] | None = None,
 
 
 def _run(command: click.Command, arguments: Sequence[str] | None, name: str) -> None:
-    from scenes.description import SceneError
+    from onespp.scenes.description import SceneError
 
     _Stop.asked = _Stop.at_once = False
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -104,7 +104,7 @@ def _lies_in(module: ModuleType, folder: Path) -> bool:
 def _checked(made: Any) -> Scene:
     if not isinstance(made, Scene):
         raise SceneError("there is no scene here: add a function `scene()` that returns a "
-                         "scenes.description.Scene")
+                         "onespp.scenes.description.Scene")
     if Path(made.name).name != made.name or not made.name.strip(". "):
         raise SceneError(f"the scene's name is {made.name[:40]!r}: files are named after it, so "
                          "use letters, digits and spaces")

@@ -150,7 +150,7 @@ def image(value: Any, what: str, bounds: Bounds = POSITIVE) -> np.ndarray:
     found = np.asarray(value)
     if np.issubdtype(found.dtype, np.integer) or found.dtype == bool:
         raise SceneError(f"{what} is an image of whole numbers ({found.dtype}): make 8-bit colours "
-                         "linear with scenes.materials.srgb8(...), and divide other data by its "
+                         "linear with onespp.scenes.materials.srgb8(...), and divide other data by its "
                          "largest value")
     found = _numbers(found, what)
     if found.ndim not in (2, 3) or (found.ndim == 3 and found.shape[2] not in (1, 3)):
@@ -165,7 +165,7 @@ def material(value: Any, what: str) -> Mapping[str, Any]:
     """A BSDF dictionary all of whose values are of kinds that Mitsuba survives."""
     if not isinstance(value, Mapping):
         raise SceneError(f"{what} is {brief(value)}: use a material, such as "
-                         "scenes.materials.diffuse((0.8, 0.3, 0.2))")
+                         "onespp.scenes.materials.diffuse((0.8, 0.3, 0.2))")
     _check_plugin(value, Place(what), ANY, 0)
     return value
 
@@ -304,7 +304,7 @@ def _within(found: np.ndarray, what: str, bounds: Bounds) -> np.ndarray:
     least, most = float(found.min()), float(found.max())
     if least < low - _ROUNDING or most > high + _ROUNDING:
         odd = least if least < low - _ROUNDING else most
-        hint = " (8-bit colours become linear with scenes.materials.srgb8)" if most > 1 else ""
+        hint = " (8-bit colours become linear with onespp.scenes.materials.srgb8)" if most > 1 else ""
         use = f"{low:g} to {high:g}{hint}" if high < math.inf else f"{low:g} or more"
         raise SceneError(f"{what} {'is' if found.ndim == 0 else 'holds'} {odd:.6g}: use {use}")
     return np.clip(found, low, high)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-import onespp  # finds LLVM before anything imports Dr.Jit
-import render.terminal
+from onespp.cli import app
+from onespp.render.terminal import run as run_command
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -29,7 +29,7 @@ def call(capsys):
     def run(*arguments) -> tuple[int, str, str]:
         code = 0
         try:
-            render.terminal.run(onespp.app, [str(a) for a in arguments])
+            run_command(app, [str(a) for a in arguments])
         except SystemExit as stop:
             code = int(stop.code or 0)
         finally:

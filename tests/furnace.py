@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenes.description import Camera, Mesh, Scene, Shape
-from scenes.transforms import look_at, translate
+from onespp.scenes.description import Camera, Mesh, Scene, Shape
+from onespp.scenes.transforms import look_at, translate
 
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 _QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]

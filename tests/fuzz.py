@@ -26,22 +26,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from report_sequence import make_report_sequence
-from small_sequence import small_sequence
-from test_command import SCENE
 
-from denoise.compare import comparison
-from denoise.cost import cost
-from denoise.report import render_page
-from denoise.score import measure_sequence
-from denoise.scorecard import read_scores
-from denoise.times import read_times
-from render import exr
-from render.errors import InputError
-from render.games202 import export_games202, import_games202, read_mat
-from render.sequence import Sequence
-from scenes import catalog
-from scenes.description import SceneError
+from onespp.denoise.compare import comparison
+from onespp.denoise.cost import cost
+from onespp.denoise.report import render_page
+from onespp.denoise.score import measure_sequence
+from onespp.denoise.scorecard import read_scores
+from onespp.denoise.times import read_times
+from onespp.render import exr
+from onespp.render.errors import InputError
+from onespp.render.games202 import export_games202, import_games202, read_mat
+from onespp.render.sequence import Sequence
+from onespp.scenes import catalog
+from onespp.scenes.description import SceneError
+
+from .report_sequence import make_report_sequence
+from .small_sequence import small_sequence
+from .test_command import SCENE
 
 MEMORY, SECONDS = 4 << 30, 10.0
 _INTEGERS = (0, 1, -1, 2, 7, 255, 65535, 65536, 10**6, 2**31 - 1, -2**31)
@@ -83,7 +84,7 @@ def _partial(folder: Path) -> Path:
 
 
 def _read_partial(path: Path) -> None:
-    from render.job import RenderJob, _saved_progress
+    from onespp.render.job import RenderJob, _saved_progress
 
     sequence = Sequence.open(path.parents[1])
     _saved_progress(RenderJob(catalog.load("box"), (0,), *sequence.size, reference_spp=16),

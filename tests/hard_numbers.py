@@ -9,16 +9,17 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
-from synthetic import make_frame, noisy, translation, turn, with_images
 
 import onespp  # noqa: F401 - finds LLVM before anything imports Dr.Jit
-from denoise import oracles
-from denoise.methods import METHODS, build, parameters
-from denoise.surface import GUIDES
-from denoise.temporal import Temporal
-from render.frame import Frame
-from render.renderer import Renderer
-from scenes.hard import HARD
+from onespp.denoise import oracles
+from onespp.denoise.methods import METHODS, build, parameters
+from onespp.denoise.surface import GUIDES
+from onespp.denoise.temporal import Temporal
+from onespp.render.frame import Frame
+from onespp.render.renderer import Renderer
+from onespp.scenes.hard import HARD
+
+from .synthetic import make_frame, noisy, translation, turn, with_images
 
 RADIUS, LEVELS = 3, 3
 LARGEST = 1e18    # radiance beyond it is a bad pixel

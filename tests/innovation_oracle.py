@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from denoise import oracles
-from denoise.oracles import Pixels, luminance, pairs, plane_weight_distance, reproject_bilinear
-from render.frame import Frame
+from onespp.denoise import oracles
+from onespp.denoise.oracles import (
+    Pixels,
+    luminance,
+    pairs,
+    plane_weight_distance,
+    reproject_bilinear,
+)
+from onespp.render.frame import Frame
 
 H = {0: 1 / 2, 1: 1 / 4}
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from synthetic import make_frame, noisy, translation
 
-from render.manifest import Manifest, Run
-from render.sequence import Reference, Sequence
+from onespp.render.manifest import Manifest, Run
+from onespp.render.sequence import Reference, Sequence
+
+from .synthetic import make_frame, noisy, translation
 
 HEIGHT, WIDTH, COUNT, SPP = 32, 48, 4, 256
 CHANNELS = ("color", "albedo", "normal", "position", "depth", "id")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from denoise import oracles
-from denoise.oracles import Pixels, blur3x3, luminance, pairs
-from render.frame import Frame
+from onespp.denoise import oracles
+from onespp.denoise.oracles import Pixels, blur3x3, luminance, pairs
+from onespp.render.frame import Frame
 
 
 def depth_slope(frame: Frame) -> np.ndarray:
@@ -85,7 +85,7 @@ def svgf(frames: list[Frame], alpha: float = 0.2, alpha_moments: float = 0.2,
          demodulate: bool = True, split: bool = True, accumulate: bool = True,
          fallback: bool = True, temporal_variance: bool = True,
          feedback: bool = True) -> np.ndarray:
-    """The last frame's result; parameters as of `denoise.svgf.Svgf`."""
+    """The last frame's result; parameters as of `onespp.denoise.svgf.Svgf`."""
     records, previous, result = None, frames[0], np.zeros(0)
     for frame in frames:
         shape = frame["id"].shape

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from render.channels import IDS
-from render.frame import Frame
+from onespp.render.channels import IDS
+from onespp.render.frame import Frame
 
 WALL_NORMAL = np.array([0.3, 0.1, -1.0]) / np.linalg.norm([0.3, 0.1, -1.0])
 

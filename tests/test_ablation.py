@@ -1,13 +1,14 @@
 import numpy as np
 import pytest
-from synthetic import make_frame, noisy
 
-from denoise.ablation import ablate, ablation, markdown, variants
-from denoise.methods import parameters
-from render.errors import InputError
-from render.manifest import Manifest
-from render.sequence import Reference, Sequence
-from render.terminal import run
+from onespp.denoise.ablation import ablate, ablation, markdown, variants
+from onespp.denoise.methods import parameters
+from onespp.render.errors import InputError
+from onespp.render.manifest import Manifest
+from onespp.render.sequence import Reference, Sequence
+from onespp.render.terminal import run
+
+from .synthetic import make_frame, noisy
 
 
 def sequence_in(folder, reference=True):

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenes import quaternions
-from scenes.animation import (
+from onespp.scenes import quaternions
+from onespp.scenes.animation import (
     compose,
     orientation,
     rotation,
@@ -16,9 +16,9 @@ from scenes.animation import (
     track,
     translation,
 )
-from scenes.cameras import dolly, looking, orbit
-from scenes.description import SceneError
-from scenes.transforms import look_at, rotate, scale, translate
+from onespp.scenes.cameras import dolly, looking, orbit
+from onespp.scenes.description import SceneError
+from onespp.scenes.transforms import look_at, rotate, scale, translate
 
 EASES = ("linear", "smooth", "spline")
 UNEVEN = {0: (0, 0, 1), 3: (1, 2, 0), 10: (-1, 2, 5), 14: (0, 0, 1)}

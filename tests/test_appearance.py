@@ -6,12 +6,12 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from render.channels import GBUFFER
-from render.rays import pixel_rays
-from render.renderer import Renderer
-from render.variant import mi
-from scenes.description import Camera, Rectangle, Scene, Shape, Sphere
-from scenes.transforms import look_at, rotate, scale, translate
+from onespp.render.channels import GBUFFER
+from onespp.render.rays import pixel_rays
+from onespp.render.renderer import Renderer
+from onespp.render.variant import mi
+from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
+from onespp.scenes.transforms import look_at, rotate, scale, translate
 
 HEIGHT, WIDTH = 18, 24
 DIFFUSE = {"type": "diffuse", "reflectance": (0.5, 0.5, 0.5)}

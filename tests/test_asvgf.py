@@ -2,13 +2,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_sequence import make_sequence
-from synthetic import make_frame, with_images
-from test_svgf import moving, records, run, run_and_keep, still
 
-from denoise.asvgf import Asvgf, gather_strata
-from denoise.svgf import Svgf
-from render.errors import InputError
+from onespp.denoise.asvgf import Asvgf, gather_strata
+from onespp.denoise.svgf import Svgf
+from onespp.render.errors import InputError
+
+from .made_sequence import make_sequence
+from .synthetic import make_frame, with_images
+from .test_svgf import moving, records, run, run_and_keep, still
 
 H, W = 24, 28
 PLAIN: dict[str, Any] = {"demodulate": False, "feedback": False, "levels": 1}

@@ -1,13 +1,14 @@
 import drjit as dr
 import numpy as np
 import pytest
-from kernels import compiled, taking_turns
-from synthetic import make_frame, noisy, with_images
 
-from denoise import oracles
-from denoise.atrous import Atrous, estimate_variance
-from denoise.stencil import Stencil
-from render.errors import InputError
+from onespp.denoise import oracles
+from onespp.denoise.atrous import Atrous, estimate_variance
+from onespp.denoise.stencil import Stencil
+from onespp.render.errors import InputError
+
+from .kernels import compiled, taking_turns
+from .synthetic import make_frame, noisy, with_images
 
 
 def run(method, frame):

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from render import backend
-from render.arguments import parse_size
-from render.errors import InputError
-from render.trials import TRIALS, TrialError, attempt
+from onespp.render import backend
+from onespp.render.arguments import parse_size
+from onespp.render.errors import InputError
+from onespp.render.trials import TRIALS, TrialError, attempt
 
 OLD = sorted(Path("/usr/lib").glob("*/libLLVM-1[0-5].so"))
 
@@ -128,5 +128,5 @@ def test_odd_sizes_are_refused(text):
 
 
 def test_denoise_imports_no_renderer():
-    code = "import sys, denoise.stream, denoise.score; sys.exit('mitsuba' in sys.modules)"
+    code = "import sys, onespp.denoise.stream, onespp.denoise.score; sys.exit('mitsuba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

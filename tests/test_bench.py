@@ -9,15 +9,15 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
-import onespp
-from denoise.bench import KERNELS, Scaling, max_error, measure_one_thread, scaling
-from denoise.bench_table import print_scaling
-from denoise.methods import METHODS
-from denoise.probe import probe
+import onespp.cli
+from onespp.denoise.bench import KERNELS, Scaling, max_error, measure_one_thread, scaling
+from onespp.denoise.bench_table import print_scaling
+from onespp.denoise.methods import METHODS
+from onespp.denoise.probe import probe
 
 
 def test_the_command_prints_the_figures_of_every_kernel_as_json():
-    result = CliRunner().invoke(onespp.app, ["bench", "--size", "20x12", "--repeats", "2",
+    result = CliRunner().invoke(onespp.cli.app, ["bench", "--size", "20x12", "--repeats", "2",
                                              "--json", "-"])
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)

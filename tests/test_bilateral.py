@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
-from kernels import compiled, taking_turns
-from synthetic import make_frame, noisy, with_images
 
-from denoise import oracles
-from denoise.bilateral import ACOS2, Bilateral
-from render.errors import InputError
+from onespp.denoise import oracles
+from onespp.denoise.bilateral import ACOS2, Bilateral
+from onespp.render.errors import InputError
+
+from .kernels import compiled, taking_turns
+from .synthetic import make_frame, noisy, with_images
 
 
 def run(method, frame):

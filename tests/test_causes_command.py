@@ -8,13 +8,14 @@ import sys
 
 import numpy as np
 import pytest
-from synthetic import make_frame, translation
 
-from denoise.classes import CAUSES, HISTORIES
-from denoise.score import score
-from denoise.stability import STABILITY
-from render.manifest import Manifest, Run
-from render.sequence import Reference, Sequence
+from onespp.denoise.classes import CAUSES, HISTORIES
+from onespp.denoise.score import score
+from onespp.denoise.stability import STABILITY
+from onespp.render.manifest import Manifest, Run
+from onespp.render.sequence import Reference, Sequence
+
+from .synthetic import make_frame, translation
 
 H, W, COUNT = 24, 30, 4
 CHANNELS = ("color", "albedo", "normal", "position", "depth", "id")
@@ -86,7 +87,7 @@ def test_by_cause_prints_a_table_of_each(call, sequence):
 
 
 def test_by_cause_without_guides_says_what_it_takes(call, tmp_path):
-    from made_sequence import make_sequence
+    from .made_sequence import make_sequence
 
     made = make_sequence(tmp_path / "made")
     code, out, _ = call("score", made.folder, "--by-cause", "--no-pictures")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from synthetic import make_frame, translation, with_images
 
-from denoise.classes import (
+from onespp.denoise.classes import (
     CAUSES,
     HISTORIES,
     causes,
@@ -15,8 +14,10 @@ from denoise.classes import (
     lengthen,
     near_edge,
 )
-from denoise.correspondence import NOWHERE, previous_pixel
-from render.sequence import Reference
+from onespp.denoise.correspondence import NOWHERE, previous_pixel
+from onespp.render.sequence import Reference
+
+from .synthetic import make_frame, translation, with_images
 
 NAMES = list(CAUSES)
 H, W = 31, 42

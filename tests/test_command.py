@@ -11,12 +11,12 @@ import time
 
 import pytest
 
-from render.sequence import Sequence
+from onespp.render.sequence import Sequence
 
 SCENE = '''
-from scenes.description import Camera, Rectangle, Scene, Shape, Sphere
-from scenes.materials import diffuse
-from scenes.transforms import look_at, rotate, scale, translate
+from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
+from onespp.scenes.materials import diffuse
+from onespp.scenes.transforms import look_at, rotate, scale, translate
 
 def scene():
     return Scene("mine", "a scene of my own", (

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-import onespp
-from denoise.compare import comparison, parse_thresholds, standard_error
-from denoise.scorecard import FrameScore, MethodScore, Scores
-from render.errors import InputError
+import onespp.cli
+from onespp.denoise.compare import comparison, parse_thresholds, standard_error
+from onespp.denoise.scorecard import FrameScore, MethodScore, Scores
+from onespp.render.errors import InputError
 
 N = 40
 
@@ -188,28 +188,28 @@ def test_an_unknown_method_is_refused():
 
 def test_the_command_exits_1_past_a_threshold_and_says_what(files):
     paths = files(scores(np.full(N, 30.0)), scores(np.full(N, 29.0)))
-    result = CliRunner().invoke(onespp.app, ["compare", *paths])
+    result = CliRunner().invoke(onespp.cli.app, ["compare", *paths])
     assert result.exit_code == 1
     assert "WORSE" in result.output
     assert "-1.0000" in result.output
     assert "Worse past the threshold: fine: PSNR." in result.output
-    allowed = CliRunner().invoke(onespp.app, ["compare", *paths, "--threshold", "psnr_srgb=2"])
+    allowed = CliRunner().invoke(onespp.cli.app, ["compare", *paths, "--threshold", "psnr_srgb=2"])
     assert allowed.exit_code == 0
 
 
 def test_the_command_exits_0_where_nothing_changed(files):
-    result = CliRunner().invoke(onespp.app, ["compare", *files(scores(), scores())])
+    result = CliRunner().invoke(onespp.cli.app, ["compare", *files(scores(), scores())])
     assert result.exit_code == 0
     assert "2 of 2 measures are the same" in result.output
 
 
 def test_the_json_says_the_same_as_the_table(files, tmp_path):
     paths = files(scores(np.full(N, 30.0)), scores(np.full(N, 29.0)))
-    result = CliRunner().invoke(onespp.app, ["compare", *paths, "--json", "-"])
+    result = CliRunner().invoke(onespp.cli.app, ["compare", *paths, "--json", "-"])
     assert result.exit_code == 1
     rows = {(c["method"], c["measure"]): c for c in json.loads(result.output)["changes"]}
     assert rows["fine", "psnr_srgb"]["change"] == -1
     assert rows["fine", "psnr_srgb"]["failed"] is True
     assert rows["input", "psnr_srgb"]["verdict"] == "same"
-    CliRunner().invoke(onespp.app, ["compare", *paths, "--json", str(tmp_path / "c.json")])
+    CliRunner().invoke(onespp.cli.app, ["compare", *paths, "--json", str(tmp_path / "c.json")])
     assert json.loads((tmp_path / "c.json").read_text()) == json.loads(result.output)

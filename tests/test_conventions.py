@@ -7,16 +7,17 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from synthetic import make_frame, translation, turn
 
-from render.conventions import check_frame, check_motion
-from render.errors import InputError
-from render.frame import Frame
-from render.games202 import export_games202, import_games202
-from render.job import RenderJob, render_sequence
-from render.sequence import Sequence
-from scenes import catalog
-from scenes.hard import HARD
+from onespp.render.conventions import check_frame, check_motion
+from onespp.render.errors import InputError
+from onespp.render.frame import Frame
+from onespp.render.games202 import export_games202, import_games202
+from onespp.render.job import RenderJob, render_sequence
+from onespp.render.sequence import Sequence
+from onespp.scenes import catalog
+from onespp.scenes.hard import HARD
+
+from .synthetic import make_frame, translation, turn
 
 CAMERA = translation(0.5, 0.3, -1) @ turn(0.3)
 

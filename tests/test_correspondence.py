@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from synthetic import make_frame, translation, turn, with_images
 
-from denoise.correspondence import NOWHERE, carry, previous_pixel
-from render.frame import Frame
+from onespp.denoise.correspondence import NOWHERE, carry, previous_pixel
+from onespp.render.frame import Frame
+
+from .synthetic import make_frame, translation, turn, with_images
 
 FAR = (2e6, -1e6, 3e6)
 

@@ -8,16 +8,17 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from small_sequence import HEIGHT, WIDTH, small_sequence
 
-from denoise.cost import cost, startup
-from denoise.interleave import time_methods
-from denoise.memory import PeakMemory
-from denoise.score import score
-from denoise.stream import denoise_sequence
-from denoise.times import read_times
-from render.errors import InputError
-from render.manifest import Run
+from onespp.denoise.cost import cost, startup
+from onespp.denoise.interleave import time_methods
+from onespp.denoise.memory import PeakMemory
+from onespp.denoise.score import score
+from onespp.denoise.stream import denoise_sequence
+from onespp.denoise.times import read_times
+from onespp.render.errors import InputError
+from onespp.render.manifest import Run
+
+from .small_sequence import HEIGHT, WIDTH, small_sequence
 
 
 @dataclass(frozen=True)

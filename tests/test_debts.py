@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from innovation_oracle import repaid
-from synthetic import make_frame, noisy, with_images
-from test_methods import SMALL, each_method
 
-from denoise import lanes
-from denoise.debts import repay
-from denoise.methods import build
-from render.frame import Frame
+from onespp.denoise import lanes
+from onespp.denoise.debts import repay
+from onespp.denoise.methods import build
+from onespp.render.frame import Frame
+
+from .innovation_oracle import repaid
+from .synthetic import make_frame, noisy, with_images
+from .test_methods import SMALL, each_method
 
 
 def indebted(height=19, width=23, share=0.2, seed=0):

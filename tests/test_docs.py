@@ -17,22 +17,23 @@ import draw_architecture
 import from_code
 import pytest
 import results
-from report_sequence import make_report_sequence
 from sphinx.cmd.build import build_main
-from synthetic import make_frame, noisy
 
-import denoise.ablation
-import denoise.lead
-import onespp
-import render.bench
-from denoise.methods import METHODS, build, parameters
-from denoise.outliers import RemoveOutliers
-from denoise.parameters import pairs
-from denoise.peers import PEERS
-from denoise.score import score
-from denoise.stability import MEASURES
-from denoise.tonemap import srgb_from_linear
-from render.errors import InputError
+import onespp.cli
+import onespp.denoise.ablation
+import onespp.denoise.lead
+import onespp.render.bench
+from onespp.denoise.methods import METHODS, build, parameters
+from onespp.denoise.outliers import RemoveOutliers
+from onespp.denoise.parameters import pairs
+from onespp.denoise.peers import PEERS
+from onespp.denoise.score import score
+from onespp.denoise.stability import MEASURES
+from onespp.denoise.tonemap import srgb_from_linear
+from onespp.render.errors import InputError
+
+from .report_sequence import make_report_sequence
+from .synthetic import make_frame, noisy
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -49,12 +50,12 @@ UNKNOWN = {"my_scene.py", "tests/test_architecture.py"}  # the reader's, and one
 # The pages are written for the package `onespp`; until its folders are inside, what they are today.
 INSTALLED = hasattr(onespp, "__path__")
 TODAY = {
-    "onespp.denoise.run.sequence": "denoise.stream", "onespp.denoise.score.sequence":
-    "denoise.score", "onespp.denoise.metrics.table": "denoise.metrics",
+    "onespp.denoise.run.sequence": "onespp.denoise.stream", "onespp.denoise.score.sequence":
+    "onespp.denoise.score", "onespp.denoise.metrics.table": "onespp.denoise.metrics",
     "onespp.render.files.sequence import FrameSequence":
-    "render.sequence import Sequence as FrameSequence", "onespp.scenes": "scenes"}
-APART = {"lead": denoise.lead.lead, "ablate": denoise.ablation.ablation,
-         "bench render": render.bench.bench}
+    "onespp.render.sequence import Sequence as FrameSequence", "onespp.scenes": "scenes"}
+APART = {"lead": onespp.denoise.lead.lead, "ablate": onespp.denoise.ablation.ablation,
+         "bench render": onespp.render.bench.bench}
 
 
 def blocks(page: str, language: str) -> list[tuple[str, str]]:
@@ -140,7 +141,7 @@ def house(tmp_path) -> Path:
             "render/__init__": '"""Frames."""', "render/frame": "x = 1",
             "render/job": "from render.tracer.path import y\nfrom .frame import x",
             "render/tracer/__init__": '"""Light, traced."""',
-            "render/tracer/path": "from ..frame import x\ndef f(): import scenes.box",
+            "render/tracer/path": "from ..frame import x\ndef f(): import onespp.scenes.box",
             "scenes/box": "import os", "denoise/catalog": "from onespp.render import frame",
             "denoise/cli/main": "from .. import catalog\nimport onespp.render.frame"}.items():
         path = tmp_path / f"{name}.py"
@@ -163,7 +164,7 @@ def test_rooms_are_folders_and_imports_between_them(house):
 
 
 def test_a_circle_is_found_and_drawn_as_wrong(house):
-    (house / "scenes/box.py").write_text("import render.job\n")
+    (house / "scenes/box.py").write_text("import onespp.render.job\n")
     found = draw_architecture.rooms(house)
     assert ("render^", "scenes") in draw_architecture.circles(found)
     assert draw_architecture.svg(found).count(" wrong") == 3
@@ -277,7 +278,7 @@ def test_commands_in_the_text_are_there(page):
 
 
 def known_commands() -> list[str]:
-    return [*(path for path, _ in from_code.walk(onespp.app)), *APART]
+    return [*(path for path, _ in from_code.walk(onespp.cli.app)), *APART]
 
 
 def at(path: str) -> click.Command:
@@ -288,7 +289,7 @@ def find(words: list[str]) -> tuple[click.Command, list[str]]:
     """The command that words begin with, and the words behind it."""
     for length in (2, 1):
         path = " ".join(words[:length])
-        found = dict(from_code.walk(onespp.app)).get(path) or APART.get(path)
+        found = dict(from_code.walk(onespp.cli.app)).get(path) or APART.get(path)
         if found is not None:
             return found, words[length:]
     raise AssertionError(f"there is no command 'onespp {' '.join(words)}'")

@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from render.errors import InputError
-from render.exr import read_exr, read_header, write_exr
+from onespp.render.errors import InputError
+from onespp.render.exr import read_exr, read_header, write_exr
 
 
 def planes(height: int = 33, width: int = 20, seed: int = 0) -> dict[str, np.ndarray]:
@@ -79,7 +79,7 @@ def test_the_deprecated_interface_is_not_used(tmp_path, monkeypatch):
 def test_many_reads_at_once_do_not_end_the_process(tmp_path):
     """With `InputFile` this was a segmentation fault on Python 3.12 and 3.13."""
     write_exr(tmp_path / "a.exr", planes(300, 200))
-    code = ("import os, pathlib, sys; os.cpu_count = lambda: 4; from render.exr import read_exr; "
+    code = ("import os, pathlib, sys; os.cpu_count = lambda: 4; from onespp.render.exr import read_exr; "
             "from concurrent.futures import ThreadPoolExecutor as Pool; "
             "path = pathlib.Path(sys.argv[1]); stdout = sys.stdout; "
             "list(Pool(3).map(lambda _: read_exr(path), range(100))); "
@@ -132,7 +132,7 @@ def test_a_large_constant_image_is_not_taken_for_a_bomb(tmp_path):
 
 
 def test_mitsuba_opens_our_files_and_sees_the_layers(tmp_path):
-    from render.variant import mi  # sets the variant that later tests render with
+    from onespp.render.variant import mi  # sets the variant that later tests render with
 
     written = {name: image for name, image in planes().items() if name != "count"}
     write_exr(tmp_path / "a.exr", written, {"scene": "box"})

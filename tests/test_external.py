@@ -7,16 +7,17 @@ import sys
 
 import numpy as np
 import pytest
-from small_sequence import HEIGHT, WIDTH, small_sequence
 
-from denoise.external import denoise_externally
-from render.errors import InputError
+from onespp.denoise.external import denoise_externally
+from onespp.render.errors import InputError
+
+from .small_sequence import HEIGHT, WIDTH, small_sequence
 
 # Doubles every frame, and notes in its results how many it was told of.
 PROGRAM = '''
 import sys
 from pathlib import Path
-from render.exr import read_exr, write_exr
+from onespp.render.exr import read_exr, write_exr
 given, made, frames = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
 for k in range(frames):
     planes, _ = read_exr(given / f"beauty_{k}.exr", ("R", "G", "B"))
@@ -30,7 +31,7 @@ SPOILED = """
 import sys
 from pathlib import Path
 import numpy as np
-from render.exr import read_exr, write_exr
+from onespp.render.exr import read_exr, write_exr
 given, made = Path(sys.argv[1]), Path(sys.argv[2])
 for k in range(2):
     planes, _ = read_exr(given / f"beauty_{k}.exr", ("R", "G", "B"))

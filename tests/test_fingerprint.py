@@ -6,17 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from furnace import CORNERS, INWARD
 from PIL import Image
-from test_renderer import small_scene
 
-from render.errors import InputError
-from render.job import RenderJob, render_sequence
-from render.sequence import Sequence
-from render.variant import mi
-from scenes.description import Camera, Mesh
-from scenes.fingerprint import fingerprint
-from scenes.transforms import look_at, translate
+from onespp.render.errors import InputError
+from onespp.render.job import RenderJob, render_sequence
+from onespp.render.sequence import Sequence
+from onespp.render.variant import mi
+from onespp.scenes.description import Camera, Mesh
+from onespp.scenes.fingerprint import fingerprint
+from onespp.scenes.transforms import look_at, translate
+
+from .furnace import CORNERS, INWARD
+from .test_renderer import small_scene
 
 SIZE = 6
 

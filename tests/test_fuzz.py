@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from fuzz import READERS, fuzz
+
+from .fuzz import READERS, fuzz
 
 SLOW = {"scores": 40, "import": 40, "import-exr": 40}  # these read many files
 

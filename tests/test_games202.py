@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_sequence import HEIGHT, OBJECTS, WIDTH, small_frame, small_sequence
 
-from render.errors import InputError
-from render.exr import read_exr, write_exr
-from render.frame import Frame
-from render.games202 import (
+from onespp.render.errors import InputError
+from onespp.render.exr import read_exr, write_exr
+from onespp.render.frame import Frame
+from onespp.render.games202 import (
     export_games202,
     export_results,
     import_games202,
@@ -24,7 +23,9 @@ from render.games202 import (
     read_mat,
     write_mat,
 )
-from render.sequence import Sequence
+from onespp.render.sequence import Sequence
+
+from .small_sequence import HEIGHT, OBJECTS, WIDTH, small_frame, small_sequence
 
 take = partial(import_games202, check=False)  # frames of random numbers keep to no convention
 

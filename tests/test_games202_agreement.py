@@ -6,8 +6,8 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from denoise.methods import build
-from render.frame import Frame
+from onespp.denoise.methods import build
+from onespp.render.frame import Frame
 
 DATA = Path(__file__).resolve().parents[2] / "shared/data/games202-box"
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_renderer import small_scene
 
-from render.channels import FRAME, GLOSS
-from render.renderer import Renderer
-from scenes import catalog
-from scenes.description import Rectangle, Shape
-from scenes.materials import diffuse, metal, varnish
-from scenes.transforms import rotate, scale
+from onespp.render.channels import FRAME, GLOSS
+from onespp.render.renderer import Renderer
+from onespp.scenes import catalog
+from onespp.scenes.description import Rectangle, Shape
+from onespp.scenes.materials import diffuse, metal, varnish
+from onespp.scenes.transforms import rotate, scale
+
+from .test_renderer import small_scene
 
 MIRROR = {"type": "conductor", "material": "none"}
 

@@ -11,12 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from z_test import assert_same_mean
 
-from denoise.tonemap import bytes_from_linear
-from render.reference import Progress
-from render.renderer import Renderer
-from scenes import catalog
+from onespp.denoise.tonemap import bytes_from_linear
+from onespp.render.reference import Progress
+from onespp.render.renderer import Renderer
+from onespp.scenes import catalog
+
+from .z_test import assert_same_mean
 
 GOLDENS = Path(__file__).parent / "goldens"
 HEIGHT, WIDTH, GOLDEN_SPP, SPP = 24, 32, 2048, 256

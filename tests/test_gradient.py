@@ -1,14 +1,15 @@
 import numpy as np
 import pytest
-from small_sequence import contents
 
-from render.channels import FRAME, REPLAY
-from render.gradient import replay
-from render.job import RenderJob, render_sequence
-from render.manifest import parse_frames
-from render.renderer import Renderer
-from scenes.description import Camera, Rectangle, Scene, Shape, Sphere
-from scenes.transforms import look_at, rotate, scale, translate
+from onespp.render.channels import FRAME, REPLAY
+from onespp.render.gradient import replay
+from onespp.render.job import RenderJob, render_sequence
+from onespp.render.manifest import parse_frames
+from onespp.render.renderer import Renderer
+from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
+from onespp.scenes.transforms import look_at, rotate, scale, translate
+
+from .small_sequence import contents
 
 HEIGHT, WIDTH = 30, 36
 GRAY = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": (0.5,) * 3}}
@@ -151,7 +152,7 @@ def test_the_command_adds_them(tmp_path, call):
     base = ("render", "box", "--frames", "0:2", "--size", "12x9", "--out", out)
     code, _, _ = call(*base, "--channels", "+gradient")
     assert code == 0
-    from render.sequence import Sequence
+    from onespp.render.sequence import Sequence
     sequence = Sequence.open(out)
     assert sequence.manifest.channels[-2:] == REPLAY
     assert (sequence.read_frame(0)["replay"] == -1).all()

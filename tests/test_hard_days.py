@@ -13,23 +13,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fuzz import SCENE
-from report_sequence import make_report_sequence
-from small_sequence import contents, small_frame, small_manifest, small_sequence
 
-from denoise.report import write_report
-from denoise.score import measure_sequence
-from denoise.stream import _remove_stale
-from render import atomic, backend, doctor, job, lock, memory
-from render.errors import InputError
-from render.exr import read_exr
-from render.lock import writing
-from render.manifest import Run
-from render.reference import Progress
-from render.renderer import Renderer
-from render.sequence import Reference, Sequence
-from scenes import catalog
-from scenes.description import SceneError
+from onespp.denoise.report import write_report
+from onespp.denoise.score import measure_sequence
+from onespp.denoise.stream import _remove_stale
+from onespp.render import atomic, backend, doctor, job, lock, memory
+from onespp.render.errors import InputError
+from onespp.render.exr import read_exr
+from onespp.render.lock import writing
+from onespp.render.manifest import Run
+from onespp.render.reference import Progress
+from onespp.render.renderer import Renderer
+from onespp.render.sequence import Reference, Sequence
+from onespp.scenes import catalog
+from onespp.scenes.description import SceneError
+
+from .fuzz import SCENE
+from .report_sequence import make_report_sequence
+from .small_sequence import contents, small_frame, small_manifest, small_sequence
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="no such locks or files on Windows")
 linux = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -80,7 +81,7 @@ def test_nobody_writes_while_everything_is_replaced(tmp_path):
 
 @posix
 def test_the_lock_of_a_dead_process_is_taken_whatever_it_says(tmp_path):
-    code = ("import pathlib, sys, time; from render.lock import writing\n"
+    code = ("import pathlib, sys, time; from onespp.render.lock import writing\n"
             "with writing(pathlib.Path(sys.argv[1]), 'render'):\n"
             "    print('locked', flush=True); time.sleep(60)")
     process = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE,
@@ -371,7 +372,7 @@ def test_too_little_memory_is_said_before_it_is_taken(call, monkeypatch, tmp_pat
 @linux
 def test_free_memory_is_the_least_that_any_limit_leaves():
     free = memory.free_memory()
-    code = "from render.memory import free_memory; print(free_memory())"
+    code = "from onespp.render.memory import free_memory; print(free_memory())"
     limit = 400 << 20
     limited = subprocess.run(["prlimit", f"--as={limit}", sys.executable, "-c", code],
                              capture_output=True, text=True, check=True)

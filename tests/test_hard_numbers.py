@@ -7,7 +7,18 @@ from functools import cache
 import drjit as dr
 import numpy as np
 import pytest
-from hard_numbers import (
+
+from onespp.denoise import oracles
+from onespp.denoise.arrays import Color
+from onespp.denoise.methods import METHODS, build, parameters
+from onespp.denoise.stencil import Stencil
+from onespp.denoise.surface import repair
+from onespp.denoise.window_moments import RowPass, window_moments
+from onespp.render.channels import REPLAY
+from onespp.render.renderer import Renderer
+from onespp.scenes.hard import HARD
+
+from .hard_numbers import (
     CASES,
     EXACT,
     LEAST,
@@ -20,17 +31,7 @@ from hard_numbers import (
     run,
     small,
 )
-from synthetic import make_frame, noisy, with_images
-
-from denoise import oracles
-from denoise.arrays import Color
-from denoise.methods import METHODS, build, parameters
-from denoise.stencil import Stencil
-from denoise.surface import repair
-from denoise.window_moments import RowPass, window_moments
-from render.channels import REPLAY
-from render.renderer import Renderer
-from scenes.hard import HARD
+from .synthetic import make_frame, noisy, with_images
 
 each_method = pytest.mark.parametrize("name", METHODS)
 each_kernel = pytest.mark.parametrize("name", EXACT)

@@ -8,20 +8,21 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hard_numbers import pixel_errors
-from synthetic import with_images
 
-from denoise.correspondence import previous_pixel
-from denoise.hard import INPUT, Row, judge, markdown, misses, run_alone
-from denoise.methods import METHODS, build, parameters
-from render.channels import REPLAY
-from render.job import RenderJob, render_sequence
-from render.rays import camera_matrices
-from render.renderer import Renderer
-from scenes.catalog import SCENES, load
-from scenes.description import Mesh, Rectangle, SceneError, Sphere
-from scenes.hard import HARD
-from scenes.hard.parts import EVENT
+from onespp.denoise.correspondence import previous_pixel
+from onespp.denoise.hard import INPUT, Row, judge, markdown, misses, run_alone
+from onespp.denoise.methods import METHODS, build, parameters
+from onespp.render.channels import REPLAY
+from onespp.render.job import RenderJob, render_sequence
+from onespp.render.rays import camera_matrices
+from onespp.render.renderer import Renderer
+from onespp.scenes.catalog import SCENES, load
+from onespp.scenes.description import Mesh, Rectangle, SceneError, Sphere
+from onespp.scenes.hard import HARD
+from onespp.scenes.hard.parts import EVENT
+
+from .hard_numbers import pixel_errors
+from .synthetic import with_images
 
 HEIGHT, WIDTH, FRAMES = 16, 24, (3, 4, 5, 6, 9)
 REPLAYED = {"cut", "switched-on", "mirror", "shrinks", "sky"}
@@ -268,7 +269,7 @@ def test_rows_say_what_history_costs_and_when_it_is_made_good():
 
 def test_the_command_renders_judges_and_prints_every_method(call, monkeypatch, tmp_path):
     small = replace(HARD["switched-on"].make(), width=WIDTH, height=HEIGHT, frames=6)
-    monkeypatch.setattr("scenes.hard.HARD", {"switched-on": replace(HARD["switched-on"],
+    monkeypatch.setattr("onespp.scenes.hard.HARD", {"switched-on": replace(HARD["switched-on"],
                                                                     make=lambda: small)})
     code, out, _ = call("hard", "switched-on", "--out", tmp_path, "--reference-spp", 16)
     assert code == 0

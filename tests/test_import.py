@@ -7,20 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from report_sequence import HEIGHT, WIDTH, make_report_sequence
-from synthetic import make_frame, noisy, translation
 
-from denoise.methods import build
-from denoise.peers import PEERS
-from denoise.report import write_report
-from denoise.score import score
-from denoise.table import caption
-from render.errors import InputError
-from render.exr import write_exr
-from render.games202 import RESULTS, export_games202, import_games202
-from render.games202_files import gaps
-from render.manifest import Manifest
-from render.sequence import Sequence
+from onespp.denoise.methods import build
+from onespp.denoise.peers import PEERS
+from onespp.denoise.report import write_report
+from onespp.denoise.score import score
+from onespp.denoise.table import caption
+from onespp.render.errors import InputError
+from onespp.render.exr import write_exr
+from onespp.render.games202 import RESULTS, export_games202, import_games202
+from onespp.render.games202_files import gaps
+from onespp.render.manifest import Manifest
+from onespp.render.sequence import Sequence
+
+from .report_sequence import HEIGHT, WIDTH, make_report_sequence
+from .synthetic import make_frame, noisy, translation
 
 FRAMES = 3
 

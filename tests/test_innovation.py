@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import innovation_oracle
 import numpy as np
 import pytest
-from kernels import compiled, taking_turns
-from synthetic import make_frame, noisy, translation, with_images
-from test_svgf import moving
 
-from denoise import lanes
-from denoise.filtered_innovation import FilteredInnovation
-from denoise.signals import USED, read_signals
-from denoise.stencil import Stencil
-from denoise.surface import read_color
-from render.errors import InputError
+from onespp.denoise import lanes
+from onespp.denoise.filtered_innovation import FilteredInnovation
+from onespp.denoise.signals import USED, read_signals
+from onespp.denoise.stencil import Stencil
+from onespp.denoise.surface import read_color
+from onespp.render.errors import InputError
+from tests import innovation_oracle
+
+from .kernels import compiled, taking_turns
+from .synthetic import make_frame, noisy, translation, with_images
+from .test_svgf import moving
 
 
 def run(method, frames):

@@ -18,17 +18,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from fuzz import SCENE
-from small_sequence import contents
 
-from render.atomic import is_temporary
-from render.json_file import read_json
-from render.manifest import Manifest, Run
+from onespp.render.atomic import is_temporary
+from onespp.render.json_file import read_json
+from onespp.render.manifest import Manifest, Run
+
+from .fuzz import SCENE
+from .small_sequence import contents
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
 
 # Partial references are saved after every pass here, so that kills meet them.
-PROGRAM = "import render.job; render.job.SECONDS_BETWEEN_SAVES = 0; import onespp; onespp.main()"
+PROGRAM = "import onespp.render.job; onespp.render.job.SECONDS_BETWEEN_SAVES = 0; import onespp.cli; onespp.cli.main()"
 COMMANDS = {
     "render": ("render", "{scene}", "--frames", "0:8", "--size", "64x48", "--reference-spp", "16",
                "--out", "{out}"),

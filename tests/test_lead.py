@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pytest
 from click.testing import CliRunner
-from report_sequence import make_report_sequence
 
-from denoise.lead import CAUSES, lead, markdown
-from denoise.score import score
-from render.errors import InputError
+from onespp.denoise.lead import CAUSES, lead, markdown
+from onespp.denoise.score import score
+from onespp.render.errors import InputError
+
+from .report_sequence import make_report_sequence
 
 
 @pytest.fixture(scope="module")

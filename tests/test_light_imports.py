@@ -10,11 +10,11 @@ import pytest
 
 MAPS = Path("/proc/self/maps")
 LIGHT = (
-    "render", "render.sequence", "render.exr", "render.games202", "render.command", "denoise",
-    "denoise.metrics", "denoise.flip", "denoise.stability", "denoise.classes", "denoise.judge",
-    "denoise.scorecard", "denoise.cost", "denoise.times", "denoise.compare", "denoise.pictures",
-    "denoise.provenance", "denoise.score", "denoise.report", "denoise.command",
-    "denoise.score_command", "scenes", "onespp")
+    "render", "onespp.render.sequence", "onespp.render.exr", "onespp.render.games202", "onespp.render.command", "denoise",
+    "onespp.denoise.metrics", "onespp.denoise.flip", "onespp.denoise.stability", "onespp.denoise.classes", "onespp.denoise.judge",
+    "onespp.denoise.scorecard", "onespp.denoise.cost", "onespp.denoise.times", "onespp.denoise.compare", "onespp.denoise.pictures",
+    "onespp.denoise.provenance", "onespp.denoise.score", "onespp.denoise.report", "onespp.denoise.command",
+    "onespp.denoise.score_command", "scenes", "onespp")
 CODE = """
 import importlib, sys
 from pathlib import Path
@@ -40,15 +40,15 @@ def test_what_reads_scores_and_shows_frames_loads_no_compiler():
 
 @pytest.mark.skipif(not MAPS.exists(), reason="what is loaded can be told on Linux alone")
 def test_methods_do_load_it_and_the_test_would_see_it():
-    assert loaded("denoise.atrous") == [["denoise.atrous", "drjit", "LLVM"]]
+    assert loaded("onespp.denoise.atrous") == [["onespp.denoise.atrous", "drjit", "LLVM"]]
 
 
 @pytest.mark.skipif(not MAPS.exists(), reason="what is loaded can be told on Linux alone")
-@pytest.mark.parametrize(("first", "then"), [("render", "drjit"), ("denoise.metrics", "mitsuba")])
+@pytest.mark.parametrize(("first", "then"), [("render", "drjit"), ("onespp.denoise.metrics", "mitsuba")])
 def test_the_llvm_is_ours_whatever_asks_for_it_first(first, then):
     """A plain `import drjit` finds the system's, which may be one that it would crash with."""
     code = (f"import os; os.environ.pop('DRJIT_LIBLLVM_PATH', None); import {first}; import {then};"
-            "import drjit.llvm; drjit.llvm.Float([1]) + 1; from render.backend import find_llvm; "
+            "import drjit.llvm; drjit.llvm.Float([1]) + 1; from onespp.render.backend import find_llvm; "
             "print({line.split()[-1] for line in open('/proc/self/maps') if 'libLLVM' in line} == "
             "{os.path.realpath(find_llvm().path)})")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

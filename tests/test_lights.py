@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_renderer import small_scene
-from z_test import assert_same_mean, blocks, mean_and_variance
 
-from render.channels import FRAME, SPLIT
-from render.errors import InputError
-from render.renderer import Renderer
-from scenes import catalog
+from onespp.render.channels import FRAME, SPLIT
+from onespp.render.errors import InputError
+from onespp.render.renderer import Renderer
+from onespp.scenes import catalog
+
+from .test_renderer import small_scene
+from .z_test import assert_same_mean, blocks, mean_and_variance
 
 
 @pytest.mark.parametrize("name", ["box", "room"])

@@ -8,10 +8,11 @@ from __future__ import annotations
 import drjit as dr
 import numpy as np
 import pytest
-from synthetic import make_frame, noisy, with_images
 
-from denoise.memory import PeakMemory
-from denoise.methods import METHODS, build, parameters
+from onespp.denoise.memory import PeakMemory
+from onespp.denoise.methods import METHODS, build, parameters
+
+from .synthetic import make_frame, noisy, with_images
 
 HEIGHT, WIDTH, SIGMA, WARM = 48, 64, 0.1, 40
 STILL = make_frame(HEIGHT, WIDTH, wall_end=1e9)

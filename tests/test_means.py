@@ -7,22 +7,23 @@ import json
 
 import numpy as np
 import pytest
-from made_sequence import COUNT, HEIGHT, SPP, WIDTH, make_sequence, truth, write_method
 from rich.console import Console
 
-from denoise.compare import comparison
-from denoise.means import mean_decibels, mean_over_frames
-from denoise.metrics import METRICS, PSNR_CAP, psnr
-from denoise.pictures import display_error
-from denoise.score import score
-from denoise.scorecard import INPUT, read_scores
-from denoise.stability import MEASURES
-from denoise.table import cells, print_scores
-from denoise.tonemap import srgb_from_linear
-from render.errors import InputError
-from render.frame import Frame
-from render.manifest import Run
-from render.sequence import Reference, Sequence
+from onespp.denoise.compare import comparison
+from onespp.denoise.means import mean_decibels, mean_over_frames
+from onespp.denoise.metrics import METRICS, PSNR_CAP, psnr
+from onespp.denoise.pictures import display_error
+from onespp.denoise.score import score
+from onespp.denoise.scorecard import INPUT, read_scores
+from onespp.denoise.stability import MEASURES
+from onespp.denoise.table import cells, print_scores
+from onespp.denoise.tonemap import srgb_from_linear
+from onespp.render.errors import InputError
+from onespp.render.frame import Frame
+from onespp.render.manifest import Run
+from onespp.render.sequence import Reference, Sequence
+
+from .made_sequence import COUNT, HEIGHT, SPP, WIDTH, make_sequence, truth, write_method
 
 BLACK = np.zeros((HEIGHT, WIDTH, 3), np.float32)
 

@@ -5,9 +5,19 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from scenes.description import Mesh, SceneError
-from scenes.meshes import box, ellipsoid, lathe, merge, paint, place, rounded_box, surface, torus
-from scenes.transforms import rotate, scale, translate
+from onespp.scenes.description import Mesh, SceneError
+from onespp.scenes.meshes import (
+    box,
+    ellipsoid,
+    lathe,
+    merge,
+    paint,
+    place,
+    rounded_box,
+    surface,
+    torus,
+)
+from onespp.scenes.transforms import rotate, scale, translate
 
 VASE = [(0, 0), (1, 0), (1, 0), (1.5, 1), (0.7, 2), (0.7, 2), (0.6, 2), (0.6, 2),
         (1.3, 1), (0, 0.2)]

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from synthetic import make_frame, noisy, translation, with_images
 
-from denoise.methods import METHODS, build, parameters
-from denoise.surface import repair
-from denoise.timing import timed
-from render.errors import InputError
-from render.frame import Frame
+from onespp.denoise.methods import METHODS, build, parameters
+from onespp.denoise.surface import repair
+from onespp.denoise.timing import timed
+from onespp.render.errors import InputError
+from onespp.render.frame import Frame
+
+from .synthetic import make_frame, noisy, translation, with_images
 
 # Small windows keep these quick; the formulas are tested with the defaults elsewhere.
 SMALL = {"bilateral": {"radius": "4"}, "bilateral-separable": {"radius": "4"},

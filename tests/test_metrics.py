@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from denoise import flip
-from denoise.metrics import (
+from onespp.denoise import flip
+from onespp.denoise.metrics import (
     HEADLINE,
     METRICS,
     PSNR_CAP,
@@ -25,8 +25,8 @@ from denoise.metrics import (
     smape,
     spread,
 )
-from denoise.ssim import ssim
-from denoise.tonemap import bytes_from_linear, linear_from_srgb, srgb_from_linear
+from onespp.denoise.ssim import ssim
+from onespp.denoise.tonemap import bytes_from_linear, linear_from_srgb, srgb_from_linear
 
 
 def images(seed: int = 0, height: int = 7, width: int = 5) -> tuple[np.ndarray, np.ndarray]:

@@ -2,15 +2,16 @@ import json
 
 import numpy as np
 import pytest
-from kernels import compiled
-from synthetic import make_frame, noisy, translation, with_images
 
-from denoise.methods import build, channels_read, parameters
-from denoise.oracles import pairs, plane_weight_distance, read
-from denoise.outliers import FEWEST, RemoveOutliers, energy_kept
-from render.errors import InputError
-from render.manifest import Manifest
-from render.sequence import Sequence
+from onespp.denoise.methods import build, channels_read, parameters
+from onespp.denoise.oracles import pairs, plane_weight_distance, read
+from onespp.denoise.outliers import FEWEST, RemoveOutliers, energy_kept
+from onespp.render.errors import InputError
+from onespp.render.manifest import Manifest
+from onespp.render.sequence import Sequence
+
+from .kernels import compiled
+from .synthetic import make_frame, noisy, translation, with_images
 
 
 def clean(stage, *frames):

@@ -7,9 +7,10 @@ import subprocess
 import sys
 
 import pytest
-from report_sequence import make_report_sequence
 
-from render import terminal
+from onespp.render import terminal
+
+from .report_sequence import make_report_sequence
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="a shell of POSIX closes streams")
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from furnace import furnace
-from z_test import assert_same_mean, blocks, mean_and_variance
 
-from render.renderer import Renderer
-from render.variant import mi
-from scenes import catalog
+from onespp.render.renderer import Renderer
+from onespp.render.variant import mi
+from onespp.scenes import catalog
+
+from .furnace import furnace
+from .z_test import assert_same_mean, blocks, mean_and_variance
 
 ALBEDO, EMISSION, DEPTH = 0.6, 0.8, 5
 

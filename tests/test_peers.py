@@ -7,14 +7,15 @@ import sys
 
 import numpy as np
 import pytest
-from synthetic import make_frame, noisy, with_images
 
-from denoise import oidn
-from denoise.methods import METHODS, build, parameters
-from denoise.peers import PEERS
-from render import backend
-from render.errors import InputError
-from render.frame import Frame
+from onespp.denoise import oidn
+from onespp.denoise.methods import METHODS, build, parameters
+from onespp.denoise.peers import PEERS
+from onespp.render import backend
+from onespp.render.errors import InputError
+from onespp.render.frame import Frame
+
+from .synthetic import make_frame, noisy, with_images
 
 H, W = 40, 48
 
@@ -62,7 +63,7 @@ def test_without_cuda_optix_says_so_in_one_line(monkeypatch):
 
 
 def test_no_peer_brings_in_mitsuba_before_it_is_used():
-    code = ("import sys, denoise.methods; "
+    code = ("import sys, onespp.denoise.methods; "
             "sys.exit('mitsuba' in sys.modules or 'pyoidn' in sys.modules)")
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 

@@ -7,18 +7,19 @@ from dataclasses import replace
 import drjit as dr
 import numpy as np
 import pytest
-from test_innovation import run
-from test_renderer import gray, small_scene
-from test_shadow_motion import in_shadow, rendered, shadow_scene
 
-from denoise.filtered_innovation import FilteredInnovation
-from denoise.penumbra import PenumbraSample, footprint_falloff, light_sizes
-from denoise.shadow_motion import follow_shadows, read_shadow_rays
-from denoise.stencil import Stencil
-from denoise.surface import read_surface
-from render.renderer import Renderer
-from scenes.description import Camera, Rectangle, Shape
-from scenes.transforms import look_at, rotate, scale, translate
+from onespp.denoise.filtered_innovation import FilteredInnovation
+from onespp.denoise.penumbra import PenumbraSample, footprint_falloff, light_sizes
+from onespp.denoise.shadow_motion import follow_shadows, read_shadow_rays
+from onespp.denoise.stencil import Stencil
+from onespp.denoise.surface import read_surface
+from onespp.render.renderer import Renderer
+from onespp.scenes.description import Camera, Rectangle, Shape
+from onespp.scenes.transforms import look_at, rotate, scale, translate
+
+from .test_innovation import run
+from .test_renderer import gray, small_scene
+from .test_shadow_motion import in_shadow, rendered, shadow_scene
 
 SIDE, LIGHT, EDGE = 0.8, 3.0, 1.0  # side of the light; heights of light and of a board below it
 

@@ -8,14 +8,13 @@ import subprocess
 import imageio_ffmpeg
 import numpy as np
 import pytest
-from made_sequence import COUNT, HEIGHT, WIDTH, make_sequence, truth
 from matplotlib import colormaps
 from PIL import Image
 
-import denoise.movie
-from denoise.movie import MovieError, write_movie
-from denoise.panels import ERROR_MAX, GAP, error_picture, panel, scaled_size, shortened, tile
-from denoise.pictures import (
+import onespp.denoise.movie
+from onespp.denoise.movie import MovieError, write_movie
+from onespp.denoise.panels import ERROR_MAX, GAP, error_picture, panel, scaled_size, shortened, tile
+from onespp.denoise.pictures import (
     LARGE_ENOUGH,
     WANTED,
     _columns,
@@ -23,11 +22,13 @@ from denoise.pictures import (
     display_error,
     movie_pictures,
 )
-from denoise.plot import pareto_front, plot_speed_against_error
-from denoise.score import measure_sequence, score
-from denoise.scorecard import INPUT
-from denoise.tonemap import bytes_from_linear, srgb_from_linear
-from render.errors import InputError
+from onespp.denoise.plot import pareto_front, plot_speed_against_error
+from onespp.denoise.score import measure_sequence, score
+from onespp.denoise.scorecard import INPUT
+from onespp.denoise.tonemap import bytes_from_linear, srgb_from_linear
+from onespp.render.errors import InputError
+
+from .made_sequence import COUNT, HEIGHT, WIDTH, make_sequence, truth
 
 
 @pytest.fixture(scope="module")
@@ -203,7 +204,7 @@ def test_without_ffmpeg_there_is_one_sentence_and_all_else(tmp_path, monkeypatch
     def none():
         raise RuntimeError("No ffmpeg exe could be found")
 
-    monkeypatch.setattr(denoise.movie.imageio_ffmpeg, "get_ffmpeg_exe", none)
+    monkeypatch.setattr(onespp.denoise.movie.imageio_ffmpeg, "get_ffmpeg_exe", none)
     sequence = make_sequence(tmp_path / "made")
     scores = score(sequence)
     assert [note for note in scores.notes if "no movie" in note and "\n" not in note]
@@ -218,7 +219,7 @@ def test_an_ffmpeg_that_fails_is_named_with_its_reason(tmp_path, monkeypatch, sc
     program = tmp_path / "ffmpeg"
     program.write_text(script)
     program.chmod(0o755)
-    monkeypatch.setattr(denoise.movie.imageio_ffmpeg, "get_ffmpeg_exe", lambda: str(program))
+    monkeypatch.setattr(onespp.denoise.movie.imageio_ffmpeg, "get_ffmpeg_exe", lambda: str(program))
     big = np.zeros((512, 512, 3), np.uint8)
     with pytest.raises(MovieError, match="broken"):
         write_movie(tmp_path / "out/a.mp4", [big, big], 24)

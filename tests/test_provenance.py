@@ -10,17 +10,18 @@ import shlex
 from html import unescape
 
 import pytest
-from made_sequence import COUNT, METHODS, make_sequence
-from small_sequence import small_manifest
 
-from denoise.provenance import commands, provenance
-from denoise.report import write_report
-from denoise.score import score
-from denoise.scorecard import read_scores
-from denoise.times import MethodTime, Times, read_times
-from render.json_file import format_json
-from render.machine import machine
-from render.sequence import Sequence
+from onespp.denoise.provenance import commands, provenance
+from onespp.denoise.report import write_report
+from onespp.denoise.score import score
+from onespp.denoise.scorecard import read_scores
+from onespp.denoise.times import MethodTime, Times, read_times
+from onespp.render.json_file import format_json
+from onespp.render.machine import machine
+from onespp.render.sequence import Sequence
+
+from .made_sequence import COUNT, METHODS, make_sequence
+from .small_sequence import small_manifest
 
 
 def listed(page) -> list[str]:
@@ -115,7 +116,7 @@ def test_files_of_before_commands_were_recorded_still_open(tmp_path):
 
 @pytest.mark.parametrize("arguments", [["scenes"], []])
 def test_a_command_that_makes_nothing_records_nothing(call, arguments):
-    from render.terminal import command_line
+    from onespp.render.terminal import command_line
 
     call(*arguments)
     assert command_line() == ""

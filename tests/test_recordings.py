@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import drjit as dr
 import pytest
-from furnace import CORNERS, INWARD
-from test_renderer import gray, small_scene
 
-from render.channels import FRAME, GLOSS, REPLAY, SHADOW, SPLIT
-from render.renderer import Renderer
-from scenes import catalog
-from scenes.description import Camera, Cylinder, Disk, Mesh, Rectangle, Scene, Shape, Sphere
-from scenes.transforms import look_at, rotate, scale, translate
+from onespp.render.channels import FRAME, GLOSS, REPLAY, SHADOW, SPLIT
+from onespp.render.renderer import Renderer
+from onespp.scenes import catalog
+from onespp.scenes.description import Camera, Cylinder, Disk, Mesh, Rectangle, Scene, Shape, Sphere
+from onespp.scenes.transforms import look_at, rotate, scale, translate
+
+from .furnace import CORNERS, INWARD
+from .test_renderer import gray, small_scene
 
 HEIGHT, WIDTH = 6, 8
 KINDS = {"sphere": Sphere(), "rectangle": Rectangle(), "disk": Disk(), "cylinder": Cylinder(),

@@ -6,18 +6,19 @@ import json
 
 import numpy as np
 import pytest
-from furnace import furnace
-from test_renderer import small_scene
 
-import render.job
-import render.reference
-from render.errors import InputError
-from render.job import RenderJob, render_sequence
-from render.reference import Progress, pass_sizes, render_reference
-from render.renderer import Renderer
-from render.sampler import Sobol, keys_from_seed
-from render.sequence import Sequence
-from render.variant import mi
+import onespp.render.job
+import onespp.render.reference
+from onespp.render.errors import InputError
+from onespp.render.job import RenderJob, render_sequence
+from onespp.render.reference import Progress, pass_sizes, render_reference
+from onespp.render.renderer import Renderer
+from onespp.render.sampler import Sobol, keys_from_seed
+from onespp.render.sequence import Sequence
+from onespp.render.variant import mi
+
+from .furnace import furnace
+from .test_renderer import small_scene
 
 SIZE = 12
 
@@ -116,7 +117,7 @@ def test_a_complete_folder_is_left_alone(tmp_path, monkeypatch):
     job = RenderJob(small_scene(), [0, 2], SIZE, SIZE, reference_spp=4)
     sequence = render_sequence(job, tmp_path / "a")
     before = {p: p.stat().st_mtime_ns for p in sequence.folder.rglob("*.*")}
-    monkeypatch.setattr(render.job, "Renderer", None)
+    monkeypatch.setattr(onespp.render.job, "Renderer", None)
     render_sequence(job, tmp_path / "a")
     assert {p: p.stat().st_mtime_ns for p in sequence.folder.rglob("*.*")} == before
 
@@ -187,7 +188,7 @@ def test_a_damaged_reference_of_more_samples_is_made_anew(tmp_path):
     (24, 24, 8)])    # 8 passes of 3: anew
 def test_what_an_interrupt_left_of_a_better_reference_is_used(tmp_path, monkeypatch, asked, spp,
                                                               traced):
-    monkeypatch.setattr(render.reference, "LARGEST_PASS", 4)
+    monkeypatch.setattr(onespp.render.reference, "LARGEST_PASS", 4)
     scene, real, passes = small_scene(), Renderer.sample_sum, []
 
     def counted(self, *arguments):
@@ -220,7 +221,7 @@ def test_an_edited_scene_is_not_taken_for_the_old_one(tmp_path):
 @pytest.mark.parametrize(("more", "passes"), [(48, 4), (33, 9)])
 def test_a_reference_of_more_samples_goes_on_from_the_one_of_fewer(tmp_path, monkeypatch, more,
                                                                    passes):
-    monkeypatch.setattr(render.reference, "LARGEST_PASS", 4)
+    monkeypatch.setattr(onespp.render.reference, "LARGEST_PASS", 4)
     real, numbers = Renderer.sample_sum, []
 
     def counted(self, index, seed, number, *arguments):

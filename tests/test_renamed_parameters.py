@@ -8,23 +8,24 @@ from types import MappingProxyType
 from typing import ClassVar
 
 import pytest
-from synthetic import make_frame
-from test_compare import comparison, scores
 
-from denoise.methods import METHODS, build, parameters
-from denoise.parameters import (
+from onespp.denoise.methods import METHODS, build, parameters
+from onespp.denoise.parameters import (
     HISTORY_RENAMED,
     INNOVATION_RENAMED,
     present_parameters,
     renamed_parameters,
     with_present_names,
 )
-from denoise.stream import denoise_sequence
-from denoise.svgf import Svgf
-from denoise.tune import Search, starting_point
-from render.errors import InputError
-from render.manifest import Manifest
-from render.sequence import Sequence
+from onespp.denoise.stream import denoise_sequence
+from onespp.denoise.svgf import Svgf
+from onespp.denoise.tune import Search, starting_point
+from onespp.render.errors import InputError
+from onespp.render.manifest import Manifest
+from onespp.render.sequence import Sequence
+
+from .synthetic import make_frame
+from .test_compare import comparison, scores
 
 
 def former(method) -> dict:
@@ -126,7 +127,7 @@ def test_scores_of_two_versions_have_the_same_parameters():
 def test_a_search_of_the_last_version_is_gone_on_with(tmp_path, monkeypatch):
     file = tmp_path / "tried.json"
     file.write_text(json.dumps({json.dumps(former(Svgf()), sort_keys=True): 31.5}))
-    monkeypatch.setattr("denoise.tune.mean_psnr", lambda *_: pytest.fail("measured twice"))
+    monkeypatch.setattr("onespp.denoise.tune.mean_psnr", lambda *_: pytest.fail("measured twice"))
     search = Search("svgf", starting_point("svgf", {}), [], file)
     assert search.value(starting_point("svgf", {})) == 31.5
 

@@ -7,15 +7,16 @@ from dataclasses import replace
 import drjit as dr
 import numpy as np
 import pytest
-from furnace import CORNERS, INWARD, furnace
 
-from render.channels import FRAME
-from render.errors import InputError
-from render.renderer import Renderer
-from render.variant import mi
-from scenes import catalog
-from scenes.description import Camera, Mesh, Rectangle, Scene, SceneError, Shape, Sphere
-from scenes.transforms import look_at, rotate, scale, translate
+from onespp.render.channels import FRAME
+from onespp.render.errors import InputError
+from onespp.render.renderer import Renderer
+from onespp.render.variant import mi
+from onespp.scenes import catalog
+from onespp.scenes.description import Camera, Mesh, Rectangle, Scene, SceneError, Shape, Sphere
+from onespp.scenes.transforms import look_at, rotate, scale, translate
+
+from .furnace import CORNERS, INWARD, furnace
 
 HEIGHT, WIDTH = 18, 24
 
@@ -210,7 +211,7 @@ def test_an_empty_size_and_a_stretched_ball_are_refused_in_a_sentence():
 
 
 def test_the_benchmark_times_both_renderers():
-    from render.bench import time_frames
+    from onespp.render.bench import time_frames
 
     ours, theirs = time_frames("box", 16, 2)
     assert len(ours) == len(theirs) == 2

@@ -10,16 +10,17 @@ import zlib
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from report_sequence import CHANNELS, COUNT, METHODS, make_report_sequence
-from small_sequence import contents
 
-import onespp
-from denoise.packed import GUIDE, RADIANCE, WHOLE, pack
-from denoise.pictures import display_error
-from denoise.report import EDGES, render_page, write_report
-from denoise.score import score
-from render.errors import InputError
-from render.sequence import Sequence
+import onespp.cli
+from onespp.denoise.packed import GUIDE, RADIANCE, WHOLE, pack
+from onespp.denoise.pictures import display_error
+from onespp.denoise.report import EDGES, render_page, write_report
+from onespp.denoise.score import score
+from onespp.render.errors import InputError
+from onespp.render.sequence import Sequence
+
+from .report_sequence import CHANNELS, COUNT, METHODS, make_report_sequence
+from .small_sequence import contents
 
 
 @pytest.fixture(scope="module")
@@ -231,7 +232,7 @@ def test_an_unknown_channel_is_refused_by_name(reported):
 
 def test_the_command_scores_first_where_there_are_no_scores(tmp_path):
     sequence = make_report_sequence(tmp_path / "made", frames=1)
-    result = CliRunner().invoke(onespp.app, ["report", str(sequence.folder)])
+    result = CliRunner().invoke(onespp.cli.app, ["report", str(sequence.folder)])
     assert result.exit_code == 0, result.output
     assert (sequence.folder / "scores.json").exists()
     assert "report/index.html" in result.output.replace("\n", "")

@@ -8,13 +8,14 @@ from urllib.parse import parse_qs
 
 import numpy as np
 import pytest
-from report_sequence import COUNT, HEIGHT, METHODS, WIDTH, make_report_sequence
 
-from denoise.flip import flip_map
-from denoise.metrics import pair
-from denoise.report import write_report
-from denoise.score import score
-from denoise.tonemap import bytes_from_linear
+from onespp.denoise.flip import flip_map
+from onespp.denoise.metrics import pair
+from onespp.denoise.report import write_report
+from onespp.denoise.score import score
+from onespp.denoise.tonemap import bytes_from_linear
+
+from .report_sequence import COUNT, HEIGHT, METHODS, WIDTH, make_report_sequence
 
 playwright = pytest.importorskip(
     "playwright.sync_api", reason="playwright is not installed: pip install -e '.[dev]'")

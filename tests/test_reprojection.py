@@ -3,13 +3,14 @@ from dataclasses import replace
 import drjit as dr
 import numpy as np
 import pytest
-from synthetic import make_frame, translation, turn, with_images
 
-from denoise import oracles
-from denoise.reprojection import locate, motion_between, motion_table
-from denoise.stencil import Stencil
-from denoise.surface import read_surface
-from denoise.temporal import Temporal
+from onespp.denoise import oracles
+from onespp.denoise.reprojection import locate, motion_between, motion_table
+from onespp.denoise.stencil import Stencil
+from onespp.denoise.surface import read_surface
+from onespp.denoise.temporal import Temporal
+
+from .synthetic import make_frame, translation, turn, with_images
 
 # With alpha tiny and a clamp box that never binds, what comes out is the history itself.
 HISTORY = {"alpha": 1e-6, "color_box": 1e6}

@@ -5,24 +5,25 @@ from __future__ import annotations
 import io
 
 import pytest
-from made_sequence import make_sequence
-from report_sequence import make_report_sequence
 from rich.console import Console
 
-from denoise.atrous import Atrous
-from denoise.command import denoise_in
-from denoise.external import denoise_externally
-from denoise.methods import METHODS, build, changed, name_of
-from denoise.peers import PEERS
-from denoise.provenance import provenance
-from denoise.score import score
-from denoise.stream import denoise_sequence
-from denoise.summary import table_data
-from denoise.table import print_scores
-from render.errors import InputError
-from render.games202 import import_result
-from render.manifest import Run, check_result_name
-from render.sequence import Sequence
+from onespp.denoise.atrous import Atrous
+from onespp.denoise.command import denoise_in
+from onespp.denoise.external import denoise_externally
+from onespp.denoise.methods import METHODS, build, changed, name_of
+from onespp.denoise.peers import PEERS
+from onespp.denoise.provenance import provenance
+from onespp.denoise.score import score
+from onespp.denoise.stream import denoise_sequence
+from onespp.denoise.summary import table_data
+from onespp.denoise.table import print_scores
+from onespp.render.errors import InputError
+from onespp.render.games202 import import_result
+from onespp.render.manifest import Run, check_result_name
+from onespp.render.sequence import Sequence
+
+from .made_sequence import make_sequence
+from .report_sequence import make_report_sequence
 
 
 def table(sequence: Sequence) -> str:

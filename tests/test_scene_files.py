@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenes.catalog import load
-from scenes.description import SceneError
+from onespp.scenes.catalog import load
+from onespp.scenes.description import SceneError
 
 HEAD = """
-from scenes.description import Camera, Rectangle, Scene, Shape
-from scenes.materials import diffuse
-from scenes.transforms import look_at
+from onespp.scenes.description import Camera, Rectangle, Scene, Shape
+from onespp.scenes.materials import diffuse
+from onespp.scenes.transforms import look_at
 """
 FILE = HEAD + """
 from parts import COLOR
@@ -90,7 +90,7 @@ def test_neighbours_with_names_of_the_library_take_nothing_from_it(tmp_path):
                  **dict.fromkeys(TAKEN, "raise RuntimeError('the wrong one')"))
     program = ("import sys; sys.path[:] = [p for p in sys.path if p]; import onespp; "
                f"sys.argv = ['onespp', 'render', {mine!r}, '--out', {str(tmp_path / 'out')!r}]; "
-               "onespp.main()")
+               "onespp.cli.main()")
     done = subprocess.run([sys.executable, "-c", program], text=True, capture_output=True,
                           timeout=120, check=False)
     assert done.returncode == 0, done.stderr
@@ -173,7 +173,7 @@ def test_an_import_that_comes_too_late_is_one_sentence(tmp_path):
 
 
 def pictures(folder: Path) -> None:
-    from render.variant import mi
+    from onespp.render.variant import mi
 
     mi.Bitmap(np.full((2, 4, 3), 0.25, np.float32)).write(str(folder / "tex.exr"))
     mi.Bitmap(np.full((2, 4, 3), 3, np.float32)).write(str(folder / "sky.exr"))
@@ -181,7 +181,7 @@ def pictures(folder: Path) -> None:
 
 @pytest.mark.parametrize("named", ["relative", "from elsewhere"])
 def test_files_are_found_from_the_scenes_folder(tmp_path, monkeypatch, named):
-    from render.renderer import Renderer
+    from onespp.render.renderer import Renderer
 
     texture = '{"type": "diffuse", "reflectance": {"type": "bitmap", "filename": "tex.exr"}}'
     path = write(tmp_path / "s", parts="COLOR = (0, 0, 0)", mine=FILE.replace(

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from render.errors import InputError
-from render.renderer import Renderer
-from render.stage import Stage
-from scenes import meshes
-from scenes.description import (
+from onespp.render.errors import InputError
+from onespp.render.renderer import Renderer
+from onespp.render.stage import Stage
+from onespp.scenes import meshes
+from onespp.scenes.description import (
     Camera,
     Cylinder,
     Disk,
@@ -26,8 +26,8 @@ from scenes.description import (
     Shape,
     Sphere,
 )
-from scenes.materials import checks, diffuse, image, srgb8
-from scenes.transforms import look_at, rotate, scale, translate
+from onespp.scenes.materials import checks, diffuse, image, srgb8
+from onespp.scenes.transforms import look_at, rotate, scale, translate
 
 GRAY = diffuse((0.5, 0.5, 0.5))
 EYE = look_at((0.3, 0.2, 4), (0, 0, 0))
@@ -157,8 +157,8 @@ def test_materials_that_killed_the_process_are_refused():
     program = textwrap.dedent("""
         import numpy as np
         from test_scene_mistakes import Stage, scene
-        from scenes.description import SceneError
-        from scenes.materials import diffuse
+        from onespp.scenes.description import SceneError
+        from onespp.scenes.materials import diffuse
         for material in ({materials}):
             try:
                 Stage(scene(material))
@@ -262,7 +262,7 @@ def test_environment_is_the_same_in_any_form(environment):
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 3), (2, 2), (5, 4)])
 def test_environment_image_of_any_size_and_file(size, tmp_path):
-    from render.variant import mi
+    from onespp.render.variant import mi
 
     pixels = np.random.default_rng(1).random((*size, 3)).astype(np.float32)
     mi.Bitmap(pixels).write(str(tmp_path / "sky.exr"))
@@ -281,7 +281,7 @@ def test_environment_that_cannot_be_is_refused(environment, words):
 
 
 def test_values_in_image_files_are_checked_too(tmp_path):
-    from render.variant import mi
+    from onespp.render.variant import mi
 
     for name, value in (("bright", 2.0), ("negative", -1.0), ("nan", np.nan)):
         path = tmp_path / f"{name}.exr"

@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from scenes.catalog import SCENES, load
-from scenes.description import Cylinder, Mesh, Rectangle, Scene, SceneError, Sphere
+from onespp.scenes.catalog import SCENES, load
+from onespp.scenes.description import Cylinder, Mesh, Rectangle, Scene, SceneError, Sphere
 
 FRAMES = (0, 1, 17.25, 19, 79, 121)
 INSIDE = {"box": ((-1.04, -1.04, -1), (1.04, 1.04, 4)), "room": ((-3, 0, -2.7), (3, 2.8, 3.3))}
@@ -186,9 +186,9 @@ def test_train_drives_forward():
 
 
 FILE = """
-from scenes.description import Camera, Scene, Shape, Sphere
-from scenes.animation import spin
-from scenes.transforms import look_at, translate
+from onespp.scenes.description import Camera, Scene, Shape, Sphere
+from onespp.scenes.animation import spin
+from onespp.scenes.transforms import look_at, translate
 
 def scene():
     lamp = Shape("lamp", Sphere(), {"type": "diffuse"}, spin((0, 1, 0), 5) @ translate((2, 0, 0)),
@@ -211,7 +211,7 @@ def test_scene_file_is_loaded(tmp_path):
     ("x = 1\ny = 1 / 0\n", r"line 2: ZeroDivisionError"),
     ("def scene():\n    a = 1\n    raise RuntimeError('two\\nlines')\n", r"line 3: .*two lines"),
     ("import sys\nsys.exit(3)\n", r"line 2: SystemExit"),
-    ("from scenes.animation import track\n\nt = track({})\n", "line 3: an animation has no key"),
+    ("from onespp.scenes.animation import track\n\nt = track({})\n", "line 3: an animation has no key"),
     ("x = 1\n", "no scene here"),
     ("def scene():\n    return 4\n", "no scene here"),
     ("def scene(size):\n    return size\n", "TypeError"),

@@ -9,16 +9,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_sequence import COUNT, HEIGHT, METHODS, SPP, WIDTH, make_sequence, truth
 from rich.console import Console
 
-from denoise.metrics import METRICS, measure, reference_floor
-from denoise.score import score
-from denoise.scorecard import INPUT, read_scores
-from denoise.table import caption, print_scores
-from render.errors import InputError
-from render.manifest import Run
-from render.sequence import Sequence
+from onespp.denoise.metrics import METRICS, measure, reference_floor
+from onespp.denoise.score import score
+from onespp.denoise.scorecard import INPUT, read_scores
+from onespp.denoise.table import caption, print_scores
+from onespp.render.errors import InputError
+from onespp.render.manifest import Run
+from onespp.render.sequence import Sequence
+
+from .made_sequence import COUNT, HEIGHT, METHODS, SPP, WIDTH, make_sequence, truth
 
 EVERY_FRAME = [m for m, row in METRICS.items() if (row.most_frames or COUNT) >= COUNT]
 

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
-from kernels import compiled, taking_turns
-from synthetic import make_frame, noisy
 
-from denoise import oracles
-from denoise.separable import BilateralSeparable
+from onespp.denoise import oracles
+from onespp.denoise.separable import BilateralSeparable
+
+from .kernels import compiled, taking_turns
+from .synthetic import make_frame, noisy
 
 
 def run(method, frame):

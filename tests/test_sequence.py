@@ -10,7 +10,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from small_sequence import (
+
+from onespp.render.errors import InputError
+from onespp.render.exr import read_header
+from onespp.render.frame import Frame
+from onespp.render.manifest import Manifest, Run, format_frames, parse_frames
+from onespp.render.matrices import format_matrices, read_matrices
+from onespp.render.sequence import Reference, Sequence
+
+from .small_sequence import (
     HEIGHT,
     OBJECTS,
     WIDTH,
@@ -19,13 +27,6 @@ from small_sequence import (
     small_manifest,
     small_sequence,
 )
-
-from render.errors import InputError
-from render.exr import read_header
-from render.frame import Frame
-from render.manifest import Manifest, Run, format_frames, parse_frames
-from render.matrices import format_matrices, read_matrices
-from render.sequence import Reference, Sequence
 
 
 def test_a_frame_comes_back_exactly_and_albedo_to_half(tmp_path):

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import innovation_oracle
 import numpy as np
 import pytest
-from synthetic import translation
-from test_innovation import run, split
-from test_renderer import gray, small_scene
 
-from denoise.filtered_innovation import FilteredInnovation
-from denoise.shadow_motion import read_shadow_rays, shadow_motion
-from denoise.stencil import Stencil
-from denoise.surface import read_surface
-from render.channels import FRAME, SHADOW, SPLIT
-from render.errors import InputError
-from render.renderer import Renderer
-from scenes.description import Camera, Rectangle, Shape, Sphere
-from scenes.transforms import look_at, rotate, scale, translate
+from onespp.denoise.filtered_innovation import FilteredInnovation
+from onespp.denoise.shadow_motion import read_shadow_rays, shadow_motion
+from onespp.denoise.stencil import Stencil
+from onespp.denoise.surface import read_surface
+from onespp.render.channels import FRAME, SHADOW, SPLIT
+from onespp.render.errors import InputError
+from onespp.render.renderer import Renderer
+from onespp.scenes.description import Camera, Rectangle, Shape, Sphere
+from onespp.scenes.transforms import look_at, rotate, scale, translate
+from tests import innovation_oracle
+
+from .synthetic import translation
+from .test_innovation import run, split
+from .test_renderer import gray, small_scene
 
 HEIGHT, WIDTH = 48, 64
 STEP = np.array([0.15, 0, 0.05])  # of ball or light, a frame

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_renderer import small_scene
 
-from render.channels import FRAME, GLOSS, SHADOW, SPLIT
-from render.errors import InputError
-from render.renderer import Renderer
-from scenes import catalog
+from onespp.render.channels import FRAME, GLOSS, SHADOW, SPLIT
+from onespp.render.errors import InputError
+from onespp.render.renderer import Renderer
+from onespp.scenes import catalog
+
+from .test_renderer import small_scene
 
 FRAME_NUMBER = 3
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from denoise.correspondence import NOWHERE
-from denoise.metrics import PSNR_CAP
-from denoise.stability import STABILITY, Step, boiling, difference_psnr, flicker
+from onespp.denoise.correspondence import NOWHERE
+from onespp.denoise.metrics import PSNR_CAP
+from onespp.denoise.stability import STABILITY, Step, boiling, difference_psnr, flicker
 
 
 def step(seed: int = 0, height: int = 5, width: int = 6) -> Step:

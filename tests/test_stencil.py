@@ -7,19 +7,20 @@ from typing import NamedTuple
 import drjit as dr
 import numpy as np
 import pytest
-from kernels import compiled
-from synthetic import make_frame, noisy, translation, with_images
 
-from denoise.assignment import Assignment, AssignmentAtrous
-from denoise.atrous import Atrous
-from denoise.bilateral import Bilateral
-from denoise.exponential import exp2
-from denoise.reprojection import load_table
-from denoise.stencil import Stencil, Step, Taps
-from denoise.structure import build, evaluate, flatten
-from denoise.temporal import Temporal
-from denoise.timing import timed
-from render.errors import InputError
+from onespp.denoise.assignment import Assignment, AssignmentAtrous
+from onespp.denoise.atrous import Atrous
+from onespp.denoise.bilateral import Bilateral
+from onespp.denoise.exponential import exp2
+from onespp.denoise.reprojection import load_table
+from onespp.denoise.stencil import Stencil, Step, Taps
+from onespp.denoise.structure import build, evaluate, flatten
+from onespp.denoise.temporal import Temporal
+from onespp.denoise.timing import timed
+from onespp.render.errors import InputError
+
+from .kernels import compiled
+from .synthetic import make_frame, noisy, translation, with_images
 
 LAYOUTS = ("views", "gather")
 
@@ -436,7 +437,7 @@ import gc
 import denoise
 import drjit.llvm as llvm
 import numpy as np
-from denoise.stencil import Step
+from onespp.denoise.stencil import Step
 
 class Cycle:
     pass

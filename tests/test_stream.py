@@ -5,13 +5,14 @@ import time
 
 import numpy as np
 import pytest
-from synthetic import make_frame, noisy, translation
 
-from denoise.stream import ALONE, Pace, denoise_sequence
-from denoise.temporal import Temporal
-from render.errors import InputError
-from render.manifest import Manifest
-from render.sequence import Sequence
+from onespp.denoise.stream import ALONE, Pace, denoise_sequence
+from onespp.denoise.temporal import Temporal
+from onespp.render.errors import InputError
+from onespp.render.manifest import Manifest
+from onespp.render.sequence import Sequence
+
+from .synthetic import make_frame, noisy, translation
 
 H, W, FRAMES = 9, 11, ALONE + 4
 

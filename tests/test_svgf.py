@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
-import svgf_oracle
-from kernels import compiled, taking_turns
-from synthetic import make_frame, translation, turn, with_images
 
-from denoise.history import WORDS
-from denoise.svgf import Svgf
-from render.errors import InputError
+from onespp.denoise.history import WORDS
+from onespp.denoise.svgf import Svgf
+from onespp.render.errors import InputError
+from tests import svgf_oracle
+
+from .kernels import compiled, taking_turns
+from .synthetic import make_frame, translation, turn, with_images
 
 PARTS = ("demodulate", "split", "accumulate", "fallback", "temporal_variance", "feedback")
 

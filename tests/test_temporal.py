@@ -1,15 +1,16 @@
 import drjit as dr
 import numpy as np
 import pytest
-from kernels import compiled, taking_turns
-from synthetic import make_frame, noisy, translation, turn, with_images
 
-from denoise import oracles
-from denoise.arrays import Color
-from denoise.stencil import Stencil
-from denoise.temporal import Temporal
-from denoise.window_moments import RowPass, window_moments
-from render.errors import InputError
+from onespp.denoise import oracles
+from onespp.denoise.arrays import Color
+from onespp.denoise.stencil import Stencil
+from onespp.denoise.temporal import Temporal
+from onespp.denoise.window_moments import RowPass, window_moments
+from onespp.render.errors import InputError
+
+from .kernels import compiled, taking_turns
+from .synthetic import make_frame, noisy, translation, turn, with_images
 
 
 def run(method, frames):

@@ -5,15 +5,16 @@ from __future__ import annotations
 import json
 
 import pytest
-from synthetic import make_frame, noisy
 
-from denoise.methods import build
-from denoise.tonemap import srgb_from_linear
-from denoise.tune import Case, Search, mean_psnr, neighbours, starting_point
-from render.channels import FRAME
-from render.frame import Frame
-from render.manifest import Manifest
-from render.sequence import Reference, Sequence
+from onespp.denoise.methods import build
+from onespp.denoise.tonemap import srgb_from_linear
+from onespp.denoise.tune import Case, Search, mean_psnr, neighbours, starting_point
+from onespp.render.channels import FRAME
+from onespp.render.frame import Frame
+from onespp.render.manifest import Manifest
+from onespp.render.sequence import Reference, Sequence
+
+from .synthetic import make_frame, noisy
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +42,7 @@ def test_it_goes_on_from_what_it_had_tried(case, tmp_path, monkeypatch):
     first = Search("temporal", start, [case], file)
     result = first.run(["alpha"], factors=(2.0,))
     again = Search("temporal", start, [case], file)
-    monkeypatch.setattr("denoise.tune.mean_psnr", lambda *_: pytest.fail("measured twice"))
+    monkeypatch.setattr("onespp.denoise.tune.mean_psnr", lambda *_: pytest.fail("measured twice"))
     assert again.run(["alpha"], factors=(2.0,)) == result
     assert len(json.loads(file.read_text())) == len(first.tried) > 2
 

@@ -9,20 +9,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from ..description import Scene
+from onespp.scenes.description import Scene
+
 from .camera import backwards, cut, grazing
 from .extent import far, huge, sky, tiny
 from .light import color, emitters, fireflies, moving_light, switched_off, switched_on
-from .motion import (
-    appears,
-    behind,
-    enters,
-    leaves,
-    mirrored,
-    shrinks,
-    uncovers,
-    vanishes,
-)
+from .motion import appears, behind, enters, leaves, mirrored, shrinks, uncovers, vanishes
 from .parts import EVENT
 from .reflection import glossy_floor, mirror
 from .surface import dark, textured, thin

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from ..animation import Animation
-from ..cameras import looking
-from ..description import Camera, Rectangle, Scene, Shape
-from ..materials import checks, diffuse
-from ..transforms import look_at, rotate, scale, translate
+from onespp.scenes.animation import Animation
+from onespp.scenes.cameras import looking
+from onespp.scenes.description import Camera, Rectangle, Scene, Shape
+from onespp.scenes.materials import checks, diffuse
+from onespp.scenes.transforms import look_at, rotate, scale, translate
+
 from .parts import BOX, EVENT, FRAMES, GRAY, LIGHT, RED, X, Y, at, ball, lamp, scene, surroundings
 
 

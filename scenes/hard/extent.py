@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..animation import Animation
-from ..cameras import looking, orbit
-from ..description import Camera, Scene
-from ..transforms import Matrix, identity, scale, translate
+from onespp.scenes.animation import Animation
+from onespp.scenes.cameras import looking, orbit
+from onespp.scenes.description import Camera, Scene
+from onespp.scenes.transforms import Matrix, identity, scale, translate
+
 from .parts import BLUE, BOX, FRAMES, at, ball, lamp, scene, surroundings
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
-from ..animation import Animation
-from ..description import Color, Scene, Shape, Sphere
-from ..materials import diffuse, metal
-from ..transforms import rotate, scale, translate
+from onespp.scenes.animation import Animation
+from onespp.scenes.description import Color, Scene, Shape, Sphere
+from onespp.scenes.materials import diffuse, metal
+from onespp.scenes.transforms import rotate, scale, translate
+
 from .parts import EVENT, LIGHT, X, at, ball, lamp, scene, surroundings
 
 _THINGS = (ball(at(-0.8, 0.5, 0)), ball(at(0.9, 0.35, 0.4, 0.35), (0.15, 0.5, 0.2), name="other"))

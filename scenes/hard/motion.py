@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from ..animation import Animation
-from ..description import Scene, Shape
-from ..transforms import rotate, scale, translate
+from onespp.scenes.animation import Animation
+from onespp.scenes.description import Scene, Shape
+from onespp.scenes.transforms import rotate, scale, translate
+
 from .parts import BLUE, BOX, EVENT, RED, Y, at, ball, lamp, scene, surroundings
 
 _STILL = ball(at(0.9, 0.35, 0.4, 0.35), (0.15, 0.5, 0.2), name="other")

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..description import Camera, Color, Geometry, Rectangle, Scene, Shape, Sphere
-from ..materials import diffuse
-from ..meshes import box
-from ..transforms import Matrix, look_at, rotate, scale, translate
+from onespp.scenes.description import Camera, Color, Geometry, Rectangle, Scene, Shape, Sphere
+from onespp.scenes.materials import diffuse
+from onespp.scenes.meshes import box
+from onespp.scenes.transforms import Matrix, look_at, rotate, scale, translate
 
 FRAMES, WIDTH, HEIGHT = 10, 96, 64
 EVENT = 4

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from ..animation import Animation
-from ..description import Rectangle, Scene, Shape
-from ..materials import checks, diffuse, metal
-from ..transforms import scale, translate
+from onespp.scenes.animation import Animation
+from onespp.scenes.description import Rectangle, Scene, Shape
+from onespp.scenes.materials import checks, diffuse, metal
+from onespp.scenes.transforms import scale, translate
+
 from .parts import at, ball, lamp, scene, surroundings
 
 _MIRROR = {"type": "twosided", "bsdf": {"type": "conductor", "material": "none",

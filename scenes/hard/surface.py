@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..animation import Animation
-from ..cameras import looking
-from ..description import Camera, Rectangle, Scene, Shape
-from ..materials import checks, diffuse, image, noise
-from ..meshes import box, merge, place
-from ..transforms import rotate, scale, translate
+from onespp.scenes.animation import Animation
+from onespp.scenes.cameras import looking
+from onespp.scenes.description import Camera, Rectangle, Scene, Shape
+from onespp.scenes.materials import checks, diffuse, image, noise
+from onespp.scenes.meshes import box, merge, place
+from onespp.scenes.transforms import rotate, scale, translate
+
 from .parts import BLUE, FRAMES, RED, Z, at, ball, lamp, scene, surroundings
 
 _PAN = Camera(looking({0: (-0.15, 1.5, 5), FRAMES: (0.25, 1.5, 5)}, (0, 0.7, 0), "linear"), fov=36)

@@ -11,13 +11,13 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
-import render.command
-from denoise.bench_command import bench
-from denoise.command import DEFAULT_METHODS, denoise, denoise_in, time_
-from denoise.score_command import compare, report, score, score_in
-from denoise.tune_command import tune
-from render.terminal import BAD_INPUT, Steps, progress
-from render.terminal import run as run_command
+import onespp.render.command
+from onespp.denoise.bench_command import bench
+from onespp.denoise.command import DEFAULT_METHODS, denoise, denoise_in, time_
+from onespp.denoise.score_command import compare, report, score, score_in
+from onespp.denoise.tune_command import tune
+from onespp.render.terminal import BAD_INPUT, Steps, progress
+from onespp.render.terminal import run as run_command
 
 REFERENCE_SPP = 256
 
@@ -31,8 +31,9 @@ def app() -> None:
 @app.command()
 def scenes() -> None:
     """List the scenes: frames, size, what moves."""
-    from scenes import catalog
-    from scenes.hard import HARD
+    from onespp.scenes.hard import HARD
+
+    from .scenes import catalog
 
     for name in catalog.SCENES:
         scene = catalog.load(name)
@@ -52,8 +53,8 @@ def scenes() -> None:
               show_default=True, help="Folder of the sequences.")
 @click.option("--reference-spp", type=int, default=REFERENCE_SPP, show_default=True, metavar="N",
               help="Samples a pixel of the ground truth.")
-@render.command.device_option
-@render.command.threads_option
+@onespp.render.command.device_option
+@onespp.render.command.threads_option
 def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
          threads: int | None) -> None:
     """Try every method on hard scenes (all, or those named), and print a table in Markdown.
@@ -61,10 +62,11 @@ def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
     Renders what is missing. For each scene and method: error, what its history gains, how soon it
     recovers from a sudden change, and whether it keeps the energy.
     """
-    render.command.use(device, threads)
-    from denoise.hard import markdown
-    from scenes import catalog
-    from scenes.hard import HARD
+    onespp.render.command.use(device, threads)
+    from onespp.denoise.hard import markdown
+    from onespp.scenes.hard import HARD
+
+    from .scenes import catalog
 
     unknown = [name for name in names if name not in HARD]
     if unknown:
@@ -79,10 +81,10 @@ def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
 
 def _judge_hard(name: str, out: Path, reference_spp: int, advance: Callable[[float], None]) -> list:
     """Rows of one hard scene; `advance` is told the share that is done."""
-    from denoise.hard import judge
-    from denoise.methods import METHODS
-    from render.job import RenderJob, kept_references, render_sequence
-    from scenes.hard import HARD
+    from onespp.denoise.hard import judge
+    from onespp.denoise.methods import METHODS
+    from onespp.render.job import RenderJob, kept_references, render_sequence
+    from onespp.scenes.hard import HARD
 
     hard = HARD[name]
     scene = hard.make()
@@ -109,14 +111,14 @@ def _within(steps: Steps, number: int, name: str, part: float) -> None:
               help="Folder of the sequence; default data/SCENE.")
 @click.option("--method", "methods", multiple=True, metavar="NAME", default=DEFAULT_METHODS,
               show_default=True, help="As for `denoise`; may be given several times.")
-@render.command.render_options
+@onespp.render.command.render_options
 @click.pass_context
 def run(context: click.Context, scene: str, out: Path | None, methods: tuple[str, ...],
         device: str, threads: int | None, reference_spp: int | None, **options) -> None:
     """Render SCENE with ground truth, denoise it and score the result."""
-    render.command.use(device, threads)
+    onespp.render.command.use(device, threads)
     spp = REFERENCE_SPP if reference_spp is None else reference_spp
-    sequence = render.command.render_to(scene, out, reference_spp=spp, **options)
+    sequence = onespp.render.command.render_to(scene, out, reference_spp=spp, **options)
     default = context.get_parameter_source("methods") == ParameterSource.DEFAULT
     denoise_in(sequence.folder, methods, default=default)
     score_in(sequence.folder)
@@ -125,7 +127,7 @@ def run(context: click.Context, scene: str, out: Path | None, methods: tuple[str
 @app.command()
 def doctor() -> None:
     """Say what will run on this machine, and what to do about what won't."""
-    from render.doctor import examine
+    from onespp.render.doctor import examine
 
     marks = {"ok": "ok   ", "note": "note ", "bad": "BAD  "}
     findings = list(examine())
@@ -135,8 +137,8 @@ def doctor() -> None:
         sys.exit(BAD_INPUT)
 
 
-for command in (render.command.render, denoise, time_, score, report, compare, bench, tune,
-                render.command.import_, render.command.export):
+for command in (onespp.render.command.render, denoise, time_, score, report, compare, bench, tune,
+                onespp.render.command.import_, onespp.render.command.export):
     app.add_command(command)
 
 

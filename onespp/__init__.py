@@ -1,0 +1,1 @@
+"""Render animations at one sample per pixel, denoise them, score the result."""

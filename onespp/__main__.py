@@ -1,0 +1,5 @@
+"""`python -m onespp`: the same as `onespp`."""
+
+from .cli import main
+
+main()
