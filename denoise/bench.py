@@ -23,8 +23,8 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from onespp.render import backend
 from onespp.render.frame import Frame
+from onespp.render.host import backend
 
 from . import limits, oracles
 from .methods import build

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from onespp.render.errors import InputError
 from onespp.render.games202 import export_games202, import_result
-from onespp.render.machine import machine
+from onespp.render.host.machine import machine
 from onespp.render.manifest import Run, check_result_name
 from onespp.render.sequence import Sequence
 from onespp.render.terminal import readable

@@ -13,11 +13,11 @@ from functools import partial
 import drjit as dr
 import numpy as np
 
-from onespp.render import backend
 from onespp.render.atomic import write_text
 from onespp.render.errors import InputError
+from onespp.render.host import backend
+from onespp.render.host.machine import machine
 from onespp.render.json_file import format_json
-from onespp.render.machine import machine
 from onespp.render.sequence import Sequence
 
 from .methods import Method, channels_read, parameters

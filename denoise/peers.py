@@ -8,7 +8,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any
 
-from onespp.render import backend
+from onespp.render.host import backend
 
 from . import oidn
 from .oidn import Oidn, TemporalOidn

@@ -30,8 +30,8 @@ from typing import Any, Generic, ParamSpec, TypeVar, cast
 import drjit as dr
 import numpy as np
 
-from onespp.render import backend
 from onespp.render.errors import InputError
+from onespp.render.host import backend
 
 from .arrays import Float
 from .structure import Form, arrays_of, build, flatten

@@ -127,7 +127,7 @@ def run(context: click.Context, scene: str, out: Path | None, methods: tuple[str
 @app.command()
 def doctor() -> None:
     """Say what will run on this machine, and what to do about what won't."""
-    from onespp.render.doctor import examine
+    from onespp.render.host.doctor import examine
 
     marks = {"ok": "ok   ", "note": "note ", "bad": "BAD  "}
     findings = list(examine())

@@ -5,6 +5,6 @@ read, scored and shown without. An LLVM is looked for when Dr.Jit or Mitsuba is 
 by whoever it is, for Dr.Jit loads one at its import (see `render/backend.py`).
 """
 
-from . import backend as _backend
+from .host import backend as _backend
 
 _backend.prepare_before_drjit()

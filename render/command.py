@@ -7,15 +7,15 @@ from pathlib import Path
 
 import click
 
+from onespp.render.host.memory import require_memory
 from onespp.scenes import catalog
 
-from . import backend
 from .arguments import parse_size
 from .channels import FRAME, GLOSS, REPLAY, SHADOW, SPLIT
 from .errors import InputError
+from .host import backend
 from .lock import writing
 from .manifest import parse_frames
-from .memory import require_memory
 from .sequence import Sequence
 from .terminal import command_line, progress
 

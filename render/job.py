@@ -11,19 +11,19 @@ from pathlib import Path
 
 import numpy as np
 
+from onespp.render.host.machine import machine
+from onespp.render.host.versions import versions
 from onespp.scenes.description import Scene
 from onespp.scenes.fingerprint import fingerprint, later_fingerprints
 
-from . import backend
 from .errors import InputError
+from .host import backend
 from .json_file import checked
-from .machine import machine
 from .manifest import Manifest, first_difference
 from .reference import Progress, pass_sizes, render_reference
 from .renderer import Renderer
 from .sequence import Sequence as FrameSequence
 from .sequence import another
-from .versions import versions
 
 SECONDS_BETWEEN_SAVES = 10.0
 

@@ -82,7 +82,7 @@ def _flip(folder: Path) -> str:
 
 
 def _kernel(folder: Path) -> str:
-    from . import backend
+    from .host import backend
 
     device = backend.choose()
     import drjit as dr

@@ -10,8 +10,8 @@ from typing import Any
 
 import mitsuba
 
-from . import backend
 from .errors import InputError
+from .host import backend
 
 VARIANTS = {"llvm": "llvm_ad_rgb", "cuda": "cuda_ad_rgb"}
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from onespp.render import backend
 from onespp.render.arguments import parse_size
 from onespp.render.errors import InputError
+from onespp.render.host import backend
 from onespp.render.trials import TRIALS, TrialError, attempt
 
 OLD = sorted(Path("/usr/lib").glob("*/libLLVM-1[0-5].so"))

@@ -17,9 +17,10 @@ import pytest
 from onespp.denoise.report import write_report
 from onespp.denoise.score import measure_sequence
 from onespp.denoise.stream import _remove_stale
-from onespp.render import atomic, backend, doctor, job, lock, memory
+from onespp.render import atomic, job, lock
 from onespp.render.errors import InputError
 from onespp.render.exr import read_exr
+from onespp.render.host import backend, doctor, memory
 from onespp.render.lock import writing
 from onespp.render.manifest import Run
 from onespp.render.reference import Progress
@@ -372,7 +373,7 @@ def test_too_little_memory_is_said_before_it_is_taken(call, monkeypatch, tmp_pat
 @linux
 def test_free_memory_is_the_least_that_any_limit_leaves():
     free = memory.free_memory()
-    code = "from onespp.render.memory import free_memory; print(free_memory())"
+    code = "from onespp.render.host.memory import free_memory; print(free_memory())"
     limit = 400 << 20
     limited = subprocess.run(["prlimit", f"--as={limit}", sys.executable, "-c", code],
                              capture_output=True, text=True, check=True)

@@ -48,7 +48,7 @@ def test_methods_do_load_it_and_the_test_would_see_it():
 def test_the_llvm_is_ours_whatever_asks_for_it_first(first, then):
     """A plain `import drjit` finds the system's, which may be one that it would crash with."""
     code = (f"import os; os.environ.pop('DRJIT_LIBLLVM_PATH', None); import {first}; import {then};"
-            "import drjit.llvm; drjit.llvm.Float([1]) + 1; from onespp.render.backend import find_llvm; "
+            "import drjit.llvm; drjit.llvm.Float([1]) + 1; from onespp.render.host.backend import find_llvm; "
             "print({line.split()[-1] for line in open('/proc/self/maps') if 'libLLVM' in line} == "
             "{os.path.realpath(find_llvm().path)})")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

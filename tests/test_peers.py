@@ -11,9 +11,9 @@ import pytest
 from onespp.denoise import oidn
 from onespp.denoise.methods import METHODS, build, parameters
 from onespp.denoise.peers import PEERS
-from onespp.render import backend
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
+from onespp.render.host import backend
 
 from .synthetic import make_frame, noisy, with_images
 

@@ -16,8 +16,8 @@ from onespp.denoise.report import write_report
 from onespp.denoise.score import score
 from onespp.denoise.scorecard import read_scores
 from onespp.denoise.times import MethodTime, Times, read_times
+from onespp.render.host.machine import machine
 from onespp.render.json_file import format_json
-from onespp.render.machine import machine
 from onespp.render.sequence import Sequence
 
 from .made_sequence import COUNT, METHODS, make_sequence

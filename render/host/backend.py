@@ -17,7 +17,7 @@ from functools import cache
 from importlib.abc import MetaPathFinder
 from pathlib import Path
 
-from .errors import InputError
+from onespp.render.errors import InputError
 
 OLDEST_LLVM = 16
 _SET_BY_USER = os.environ.get("DRJIT_LIBLLVM_PATH") or None

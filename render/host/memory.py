@@ -11,7 +11,7 @@ import contextlib
 import os
 from pathlib import Path
 
-from .errors import InputError
+from onespp.render.errors import InputError
 
 BASE_BYTES = 160 << 20
 BYTES_PER_PIXEL = 470

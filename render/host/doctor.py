@@ -12,10 +12,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from onespp.render.errors import InputError
+from onespp.render.trials import TRIALS, Trial, TrialError, attempt
+
 from . import backend
-from .errors import InputError
 from .memory import BASE_BYTES, BYTES_PER_PIXEL, free_memory
-from .trials import TRIALS, Trial, TrialError, attempt
 
 PACKAGES = ("mitsuba", "drjit", "OpenEXR", "numpy")
 
