@@ -16,7 +16,7 @@ import click
 
 from onespp.render.command import device_option, threads_option, use
 from onespp.render.errors import InputError
-from onespp.render.sequence import Sequence
+from onespp.render.files.sequence import Sequence
 from onespp.render.terminal import progress, run
 
 from .ground import read_ground

@@ -18,8 +18,8 @@ from __future__ import annotations
 import numpy as np
 
 from onespp.render.errors import InputError
-from onespp.render.manifest import first_difference
-from onespp.render.sequence import Sequence
+from onespp.render.files.manifest import first_difference
+from onespp.render.files.sequence import Sequence
 
 from .metrics import pair, reference_floor
 from .scorecard import INPUT, ErrorSplit

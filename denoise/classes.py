@@ -15,8 +15,8 @@ from types import MappingProxyType
 
 import numpy as np
 
+from onespp.render.files.sequence import Reference
 from onespp.render.frame import Frame
-from onespp.render.sequence import Reference
 
 from .correspondence import MIN_COSINE, NOWHERE, carry, has_surface
 from .luminance import luminance

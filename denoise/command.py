@@ -13,9 +13,9 @@ from click.core import ParameterSource
 from onespp.render.channels import REPLAY, SPLIT
 from onespp.render.command import device_option, threads_option, use
 from onespp.render.errors import InputError
+from onespp.render.files.lock import writing
+from onespp.render.files.sequence import Sequence
 from onespp.render.games202_files import gaps
-from onespp.render.lock import writing
-from onespp.render.sequence import Sequence
 from onespp.render.terminal import command_line, note, progress
 
 from .parameters import pairs

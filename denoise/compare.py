@@ -26,7 +26,7 @@ from rich.console import Console
 from rich.table import Table
 
 from onespp.render.errors import InputError
-from onespp.render.json_file import JsonFile, format_json
+from onespp.render.files.json_file import JsonFile, format_json
 
 from .means import identical
 from .metrics import Metric

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onespp.render.files.sequence import Reference, Sequence
 from onespp.render.frame import Frame
-from onespp.render.sequence import Reference, Sequence
 
 from .classes import causes, changed_light, lengthen, moving
 from .correspondence import GUIDES, NOWHERE, previous_pixel

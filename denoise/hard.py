@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from onespp.render.errors import InputError
+from onespp.render.files.sequence import Sequence as Folder
 from onespp.render.frame import Frame
-from onespp.render.sequence import Sequence as Folder
 
 from .methods import METHODS, Method
 from .metrics import measure_pair, non_finite, pair, reference_floor

@@ -13,15 +13,15 @@ from functools import partial
 import drjit as dr
 import numpy as np
 
-from onespp.render.atomic import write_text
 from onespp.render.errors import InputError
+from onespp.render.files.atomic import write_text
+from onespp.render.files.json_file import format_json
+from onespp.render.files.sequence import Sequence
+from onespp.render.files.times import MethodTime, Times
 from onespp.render.host import backend
 from onespp.render.host.machine import machine
-from onespp.render.json_file import format_json
-from onespp.render.sequence import Sequence
 
 from .methods import Method, channels_read, parameters
-from .times import MethodTime, Times
 from .timing import timed
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from onespp.render.atomic import write_text
+from onespp.render.files.atomic import write_text
 
 json_option = click.option("--json", "json_to", metavar="FILE",
                            help="Also write the figures to FILE; - prints them instead of tables.")

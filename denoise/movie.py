@@ -9,7 +9,7 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 
-from onespp.render.atomic import replacing
+from onespp.render.files.atomic import replacing
 
 # BT.709 by conversion and by tag: players guess otherwise, and tints shift.
 _COLOURS = ("scale=out_color_matrix=bt709:out_range=tv,setparams=colorspace=bt709:"

@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 from PIL import Image
 
-from onespp.render.atomic import replacing
-from onespp.render.sequence import Sequence
+from onespp.render.files.atomic import replacing
+from onespp.render.files.sequence import Sequence
 
 from .metrics import HEADLINE, pair, spread
 from .movie import MovieError, write_movie

@@ -11,7 +11,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from onespp.render.atomic import replacing
+from onespp.render.files.atomic import replacing
 
 from .metrics import HEADLINE
 from .scorecard import INPUT, Scores

@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from onespp.render.manifest import Run
-from onespp.render.sequence import Sequence
+from onespp.render.files.manifest import Run
+from onespp.render.files.sequence import Sequence
+from onespp.render.files.times import Times, read_times
 
 from .parameters import present_parameters
 from .scorecard import INPUT, Scores
 from .summary import text_of
 from .table import caption
-from .times import Times, read_times
 
 
 def commands(sequence: Sequence, methods: Iterable[str]) -> list[str]:

@@ -18,10 +18,10 @@ from pathlib import Path
 import jinja2
 import numpy as np
 
-from onespp.render.atomic import all_or_none, write_text
 from onespp.render.channels import IDS, RADIANCE
 from onespp.render.errors import InputError
-from onespp.render.sequence import Sequence
+from onespp.render.files.atomic import all_or_none, write_text
+from onespp.render.files.sequence import Sequence
 
 from . import packed
 from .pictures import Progress, display_errors

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from onespp.render.atomic import write_text
 from onespp.render.errors import InputError
-from onespp.render.manifest import format_frames
-from onespp.render.sequence import Reference, Sequence
+from onespp.render.files.atomic import write_text
+from onespp.render.files.manifest import format_frames
+from onespp.render.files.sequence import Reference, Sequence
+from onespp.render.files.times import read_times
 
 from .bias import split_errors
 from .cost import cost
@@ -29,7 +30,6 @@ from .pictures import Progress, draw_pictures
 from .provenance import commands
 from .scorecard import INPUT, MethodScore, Scores
 from .stability import MEASURES
-from .times import read_times
 from .tonemap import TONE_MAP
 
 MOST_LOST = 0.01

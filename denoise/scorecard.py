@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import ConfigDict, Field, FiniteFloat, field_validator, model_serializer
 
-from onespp.render.json_file import JsonFile, format_json, read_json
+from onespp.render.files.json_file import JsonFile, format_json, read_json
 
 from .metrics import HEADLINE
 from .stability import MEASURES

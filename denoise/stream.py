@@ -18,12 +18,12 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
+from onespp.render.files.manifest import Run, check_result_name
+from onespp.render.files.sequence import Sequence
 from onespp.render.frame import Frame
 from onespp.render.host import backend
 from onespp.render.host.machine import machine
 from onespp.render.host.versions import versions
-from onespp.render.manifest import Run, check_result_name
-from onespp.render.sequence import Sequence
 
 from .memory import PeakMemory
 from .methods import Method, changed, channels_read, check_not_a_method, name_of, parameters

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib import colormaps
 
 from onespp.render.channels import CHANNELS
-from onespp.render.sequence import Sequence
+from onespp.render.files.sequence import Sequence
 
 from .classes import CAUSES, HISTORIES
 from .metrics import HEADLINE, PSNR_CAP, Metric

@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from onespp.render.atomic import write_text
 from onespp.render.errors import InputError
+from onespp.render.files.atomic import write_text
+from onespp.render.files.sequence import Sequence
 from onespp.render.frame import Frame
-from onespp.render.sequence import Sequence
 
 from .means import mean_decibels
 from .methods import Method, build, channels_read, parameters

@@ -8,7 +8,7 @@ import click
 
 from onespp.render.command import device_option, threads_option, use
 from onespp.render.errors import InputError
-from onespp.render.sequence import Sequence
+from onespp.render.files.sequence import Sequence
 from onespp.render.terminal import note, progress
 
 from .parameters import pairs, renamed_parameters, with_present_names

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import click
 
+from onespp.render.files.lock import writing
+from onespp.render.files.manifest import parse_frames
+from onespp.render.files.sequence import Sequence
 from onespp.render.host.memory import require_memory
 from onespp.scenes import catalog
 
@@ -14,9 +17,6 @@ from .arguments import parse_size
 from .channels import FRAME, GLOSS, REPLAY, SHADOW, SPLIT
 from .errors import InputError
 from .host import backend
-from .lock import writing
-from .manifest import parse_frames
-from .sequence import Sequence
 from .terminal import command_line, progress
 
 

@@ -11,6 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from onespp.render.files.json_file import checked
+from onespp.render.files.manifest import Manifest, first_difference
+from onespp.render.files.sequence import Sequence as FrameSequence
+from onespp.render.files.sequence import another
 from onespp.render.host.machine import machine
 from onespp.render.host.versions import versions
 from onespp.scenes.description import Scene
@@ -18,12 +22,8 @@ from onespp.scenes.fingerprint import fingerprint, later_fingerprints
 
 from .errors import InputError
 from .host import backend
-from .json_file import checked
-from .manifest import Manifest, first_difference
 from .reference import Progress, pass_sizes, render_reference
 from .renderer import Renderer
-from .sequence import Sequence as FrameSequence
-from .sequence import another
 
 SECONDS_BETWEEN_SAVES = 10.0
 

@@ -18,9 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onespp.render.files.sequence import Reference
+
 from .errors import InputError
 from .renderer import Renderer
-from .sequence import Reference
 
 LARGEST_PASS = 64  # samples; float32 sums inside a pass stay exact to ~1e-6
 MOST_PATHS = 1 << 24  # a pass; some seconds, after which it can be stopped

@@ -40,7 +40,7 @@ class Trial:
 
 
 def _openexr(folder: Path) -> str:
-    from .exr import read_exr, write_exr
+    from onespp.render.files.exr import read_exr, write_exr
 
     image = np.linspace(0, 1, 64 * 48, dtype=np.float32).reshape(48, 64)
     for _ in range(8):  # threads that race need some tries

@@ -32,11 +32,11 @@ from onespp.denoise.cost import cost
 from onespp.denoise.report import render_page
 from onespp.denoise.score import measure_sequence
 from onespp.denoise.scorecard import read_scores
-from onespp.denoise.times import read_times
-from onespp.render import exr
 from onespp.render.errors import InputError
+from onespp.render.files import exr
+from onespp.render.files.sequence import Sequence
+from onespp.render.files.times import read_times
 from onespp.render.games202 import export_games202, import_games202, read_mat
-from onespp.render.sequence import Sequence
 from onespp.scenes import catalog
 from onespp.scenes.description import SceneError
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from onespp.render.files.manifest import Manifest, Run
+from onespp.render.files.sequence import Reference, Sequence
 from onespp.render.frame import Frame
-from onespp.render.manifest import Manifest, Run
-from onespp.render.sequence import Reference, Sequence
 
 HEIGHT, WIDTH, COUNT, SPP = 21, 33, 4, 256
 METHODS = {"rough": (0.3, 2.0), "fine": (0.05, 40.0)}  # name: relative noise, ms

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from onespp.render.manifest import Manifest, Run
-from onespp.render.sequence import Reference, Sequence
+from onespp.render.files.manifest import Manifest, Run
+from onespp.render.files.sequence import Reference, Sequence
 
 from .synthetic import make_frame, noisy, translation
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from onespp.render.channels import CHANNELS, FRAME
+from onespp.render.files.manifest import Manifest
+from onespp.render.files.sequence import Sequence
 from onespp.render.frame import Frame
-from onespp.render.manifest import Manifest
-from onespp.render.sequence import Sequence
 
 HEIGHT, WIDTH = 21, 9  # two blocks of rows in a file
 OBJECTS = ("ball", 'a "quoted" wall', "sol é")

@@ -15,9 +15,9 @@ from onespp.denoise.scorecard import INPUT, read_scores
 from onespp.denoise.table import print_splits
 from onespp.denoise.tonemap import linear_from_srgb
 from onespp.render.errors import InputError
+from onespp.render.files.manifest import Manifest, Run
+from onespp.render.files.sequence import Reference, Sequence
 from onespp.render.frame import Frame
-from onespp.render.manifest import Manifest, Run
-from onespp.render.sequence import Reference, Sequence
 
 H, W, FRAMES = 40, 50, 2
 BIAS, SIGMA, NOISE = 0.03, 0.05, 0.02  # display values

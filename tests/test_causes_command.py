@@ -12,8 +12,8 @@ import pytest
 from onespp.denoise.classes import CAUSES, HISTORIES
 from onespp.denoise.score import score
 from onespp.denoise.stability import STABILITY
-from onespp.render.manifest import Manifest, Run
-from onespp.render.sequence import Reference, Sequence
+from onespp.render.files.manifest import Manifest, Run
+from onespp.render.files.sequence import Reference, Sequence
 
 from .synthetic import make_frame, translation
 

@@ -15,7 +15,7 @@ from onespp.denoise.classes import (
     near_edge,
 )
 from onespp.denoise.correspondence import NOWHERE, previous_pixel
-from onespp.render.sequence import Reference
+from onespp.render.files.sequence import Reference
 
 from .synthetic import make_frame, translation, with_images
 

@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from onespp.render.sequence import Sequence
+from onespp.render.files.sequence import Sequence
 
 SCENE = '''
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere

@@ -10,10 +10,10 @@ import pytest
 
 from onespp.render.conventions import check_frame, check_motion
 from onespp.render.errors import InputError
+from onespp.render.files.sequence import Sequence
 from onespp.render.frame import Frame
 from onespp.render.games202 import export_games202, import_games202
 from onespp.render.job import RenderJob, render_sequence
-from onespp.render.sequence import Sequence
 from onespp.scenes import catalog
 from onespp.scenes.hard import HARD
 

@@ -14,9 +14,9 @@ from onespp.denoise.interleave import time_methods
 from onespp.denoise.memory import PeakMemory
 from onespp.denoise.score import score
 from onespp.denoise.stream import denoise_sequence
-from onespp.denoise.times import read_times
 from onespp.render.errors import InputError
-from onespp.render.manifest import Run
+from onespp.render.files.manifest import Run
+from onespp.render.files.times import read_times
 
 from .small_sequence import HEIGHT, WIDTH, small_sequence
 

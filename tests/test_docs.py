@@ -53,7 +53,7 @@ TODAY = {
     "onespp.denoise.run.sequence": "onespp.denoise.stream", "onespp.denoise.score.sequence":
     "onespp.denoise.score", "onespp.denoise.metrics.table": "onespp.denoise.metrics",
     "onespp.render.files.sequence import FrameSequence":
-    "onespp.render.sequence import Sequence as FrameSequence", "onespp.scenes": "scenes"}
+    "onespp.render.files.sequence import Sequence as FrameSequence", "onespp.scenes": "scenes"}
 APART = {"lead": onespp.denoise.lead.lead, "ablate": onespp.denoise.ablation.ablation,
          "bench render": onespp.render.bench.bench}
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from onespp.render.errors import InputError
-from onespp.render.exr import read_exr, read_header, write_exr
+from onespp.render.files.exr import read_exr, read_header, write_exr
 
 
 def planes(height: int = 33, width: int = 20, seed: int = 0) -> dict[str, np.ndarray]:
@@ -79,7 +79,7 @@ def test_the_deprecated_interface_is_not_used(tmp_path, monkeypatch):
 def test_many_reads_at_once_do_not_end_the_process(tmp_path):
     """With `InputFile` this was a segmentation fault on Python 3.12 and 3.13."""
     write_exr(tmp_path / "a.exr", planes(300, 200))
-    code = ("import os, pathlib, sys; os.cpu_count = lambda: 4; from onespp.render.exr import read_exr; "
+    code = ("import os, pathlib, sys; os.cpu_count = lambda: 4; from onespp.render.files.exr import read_exr; "
             "from concurrent.futures import ThreadPoolExecutor as Pool; "
             "path = pathlib.Path(sys.argv[1]); stdout = sys.stdout; "
             "list(Pool(3).map(lambda _: read_exr(path), range(100))); "

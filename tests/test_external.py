@@ -17,7 +17,7 @@ from .small_sequence import HEIGHT, WIDTH, small_sequence
 PROGRAM = '''
 import sys
 from pathlib import Path
-from onespp.render.exr import read_exr, write_exr
+from onespp.render.files.exr import read_exr, write_exr
 given, made, frames = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
 for k in range(frames):
     planes, _ = read_exr(given / f"beauty_{k}.exr", ("R", "G", "B"))
@@ -31,7 +31,7 @@ SPOILED = """
 import sys
 from pathlib import Path
 import numpy as np
-from onespp.render.exr import read_exr, write_exr
+from onespp.render.files.exr import read_exr, write_exr
 given, made = Path(sys.argv[1]), Path(sys.argv[2])
 for k in range(2):
     planes, _ = read_exr(given / f"beauty_{k}.exr", ("R", "G", "B"))

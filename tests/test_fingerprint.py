@@ -9,8 +9,8 @@ import pytest
 from PIL import Image
 
 from onespp.render.errors import InputError
+from onespp.render.files.sequence import Sequence
 from onespp.render.job import RenderJob, render_sequence
-from onespp.render.sequence import Sequence
 from onespp.render.variant import mi
 from onespp.scenes.description import Camera, Mesh
 from onespp.scenes.fingerprint import fingerprint

@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from onespp.render.errors import InputError
-from onespp.render.exr import read_exr, write_exr
+from onespp.render.files.exr import read_exr, write_exr
+from onespp.render.files.sequence import Sequence
 from onespp.render.frame import Frame
 from onespp.render.games202 import (
     export_games202,
@@ -23,7 +24,6 @@ from onespp.render.games202 import (
     read_mat,
     write_mat,
 )
-from onespp.render.sequence import Sequence
 
 from .small_sequence import HEIGHT, OBJECTS, WIDTH, small_frame, small_sequence
 

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from onespp.render.channels import FRAME, REPLAY
+from onespp.render.files.manifest import parse_frames
 from onespp.render.gradient import replay
 from onespp.render.job import RenderJob, render_sequence
-from onespp.render.manifest import parse_frames
 from onespp.render.renderer import Renderer
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.transforms import look_at, rotate, scale, translate
@@ -152,7 +152,7 @@ def test_the_command_adds_them(tmp_path, call):
     base = ("render", "box", "--frames", "0:2", "--size", "12x9", "--out", out)
     code, _, _ = call(*base, "--channels", "+gradient")
     assert code == 0
-    from onespp.render.sequence import Sequence
+    from onespp.render.files.sequence import Sequence
     sequence = Sequence.open(out)
     assert sequence.manifest.channels[-2:] == REPLAY
     assert (sequence.read_frame(0)["replay"] == -1).all()

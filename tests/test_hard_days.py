@@ -17,15 +17,16 @@ import pytest
 from onespp.denoise.report import write_report
 from onespp.denoise.score import measure_sequence
 from onespp.denoise.stream import _remove_stale
-from onespp.render import atomic, job, lock
+from onespp.render import job
 from onespp.render.errors import InputError
-from onespp.render.exr import read_exr
+from onespp.render.files import atomic, lock
+from onespp.render.files.exr import read_exr
+from onespp.render.files.lock import writing
+from onespp.render.files.manifest import Run
+from onespp.render.files.sequence import Reference, Sequence
 from onespp.render.host import backend, doctor, memory
-from onespp.render.lock import writing
-from onespp.render.manifest import Run
 from onespp.render.reference import Progress
 from onespp.render.renderer import Renderer
-from onespp.render.sequence import Reference, Sequence
 from onespp.scenes import catalog
 from onespp.scenes.description import SceneError
 
@@ -82,7 +83,7 @@ def test_nobody_writes_while_everything_is_replaced(tmp_path):
 
 @posix
 def test_the_lock_of_a_dead_process_is_taken_whatever_it_says(tmp_path):
-    code = ("import pathlib, sys, time; from onespp.render.lock import writing\n"
+    code = ("import pathlib, sys, time; from onespp.render.files.lock import writing\n"
             "with writing(pathlib.Path(sys.argv[1]), 'render'):\n"
             "    print('locked', flush=True); time.sleep(60)")
     process = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE,

@@ -16,10 +16,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from onespp.render import atomic
 from onespp.render.errors import InputError
-from onespp.render.exr import read_exr, write_exr
-from onespp.render.sequence import Sequence
+from onespp.render.files import atomic
+from onespp.render.files.exr import read_exr, write_exr
+from onespp.render.files.sequence import Sequence
 
 from .small_sequence import HEIGHT, WIDTH, contents, small_frame, small_manifest, small_sequence
 
@@ -83,7 +83,7 @@ def test_an_image_for_which_there_is_no_memory_is_not_called_damaged(tmp_path):
         pytest.skip("the memory of a process can be limited on Linux alone")
     path, size = tmp_path / "a.exr", 6000
     write_exr(path, {"Z": np.zeros((size, size), np.float32)})
-    code = ("import resource, sys, pathlib; from onespp.render.exr import read_exr, _threads; _threads(); "
+    code = ("import resource, sys, pathlib; from onespp.render.files.exr import read_exr, _threads; _threads(); "
             "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize(); "
             f"resource.setrlimit(resource.RLIMIT_AS, (used + {2 * size * size},) * 2); "
             "read_exr(pathlib.Path(sys.argv[1]))")
@@ -141,7 +141,7 @@ def test_a_header_that_lies_about_its_size_allocates_nothing(exr, width, height)
     true_window = struct.pack("<4i", 0, 0, 39, 63)
     assert data.count(true_window) == 2
     exr.write_bytes(data.replace(true_window, struct.pack("<4i", 0, 0, width - 1, height - 1)))
-    code = ("import resource, sys, pathlib; from onespp.render.exr import read_exr; "
+    code = ("import resource, sys, pathlib; from onespp.render.files.exr import read_exr; "
             "resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30)); "
             "read_exr(pathlib.Path(sys.argv[1]))")
     run = subprocess.run([sys.executable, "-c", code, str(exr)], capture_output=True, text=True)
@@ -394,7 +394,7 @@ def test_a_real_limit_on_file_size_is_a_full_disk_too(tmp_path):
     sequence = small_sequence(tmp_path)
     before = contents(tmp_path)
     code = ("import resource, signal, sys; sys.path.insert(0, 'tests'); import numpy as np; "
-            "from onespp.render.sequence import Sequence; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
+            "from onespp.render.files.sequence import Sequence; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
             "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000)); "
             "from small_sequence import small_frame; "
             "Sequence.open(sys.argv[1]).write_result('m', 0, small_frame()['color'])")

@@ -14,11 +14,11 @@ from onespp.denoise.report import write_report
 from onespp.denoise.score import score
 from onespp.denoise.table import caption
 from onespp.render.errors import InputError
-from onespp.render.exr import write_exr
+from onespp.render.files.exr import write_exr
+from onespp.render.files.manifest import Manifest
+from onespp.render.files.sequence import Sequence
 from onespp.render.games202 import RESULTS, export_games202, import_games202
 from onespp.render.games202_files import gaps
-from onespp.render.manifest import Manifest
-from onespp.render.sequence import Sequence
 
 from .report_sequence import HEIGHT, WIDTH, make_report_sequence
 from .synthetic import make_frame, noisy, translation

@@ -19,9 +19,9 @@ from pathlib import Path
 
 import pytest
 
-from onespp.render.atomic import is_temporary
-from onespp.render.json_file import read_json
-from onespp.render.manifest import Manifest, Run
+from onespp.render.files.atomic import is_temporary
+from onespp.render.files.json_file import read_json
+from onespp.render.files.manifest import Manifest, Run
 
 from .fuzz import SCENE
 from .small_sequence import contents

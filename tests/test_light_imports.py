@@ -10,9 +10,9 @@ import pytest
 
 MAPS = Path("/proc/self/maps")
 LIGHT = (
-    "render", "onespp.render.sequence", "onespp.render.exr", "onespp.render.games202", "onespp.render.command", "denoise",
+    "render", "onespp.render.files.sequence", "onespp.render.files.exr", "onespp.render.games202", "onespp.render.command", "denoise",
     "onespp.denoise.metrics", "onespp.denoise.flip", "onespp.denoise.stability", "onespp.denoise.classes", "onespp.denoise.judge",
-    "onespp.denoise.scorecard", "onespp.denoise.cost", "onespp.denoise.times", "onespp.denoise.compare", "onespp.denoise.pictures",
+    "onespp.denoise.scorecard", "onespp.denoise.cost", "onespp.render.files.times", "onespp.denoise.compare", "onespp.denoise.pictures",
     "onespp.denoise.provenance", "onespp.denoise.score", "onespp.denoise.report", "onespp.denoise.command",
     "onespp.denoise.score_command", "scenes", "onespp")
 CODE = """

@@ -19,9 +19,9 @@ from onespp.denoise.stability import MEASURES
 from onespp.denoise.table import cells, print_scores
 from onespp.denoise.tonemap import srgb_from_linear
 from onespp.render.errors import InputError
+from onespp.render.files.manifest import Run
+from onespp.render.files.sequence import Reference, Sequence
 from onespp.render.frame import Frame
-from onespp.render.manifest import Run
-from onespp.render.sequence import Reference, Sequence
 
 from .made_sequence import COUNT, HEIGHT, SPP, WIDTH, make_sequence, truth, write_method
 

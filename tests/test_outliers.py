@@ -7,8 +7,8 @@ from onespp.denoise.methods import build, channels_read, parameters
 from onespp.denoise.oracles import pairs, plane_weight_distance, read
 from onespp.denoise.outliers import FEWEST, RemoveOutliers, energy_kept
 from onespp.render.errors import InputError
-from onespp.render.manifest import Manifest
-from onespp.render.sequence import Sequence
+from onespp.render.files.manifest import Manifest
+from onespp.render.files.sequence import Sequence
 
 from .kernels import compiled
 from .synthetic import make_frame, noisy, translation, with_images

@@ -15,10 +15,10 @@ from onespp.denoise.provenance import commands, provenance
 from onespp.denoise.report import write_report
 from onespp.denoise.score import score
 from onespp.denoise.scorecard import read_scores
-from onespp.denoise.times import MethodTime, Times, read_times
+from onespp.render.files.json_file import format_json
+from onespp.render.files.sequence import Sequence
+from onespp.render.files.times import MethodTime, Times, read_times
 from onespp.render.host.machine import machine
-from onespp.render.json_file import format_json
-from onespp.render.sequence import Sequence
 
 from .made_sequence import COUNT, METHODS, make_sequence
 from .small_sequence import small_manifest

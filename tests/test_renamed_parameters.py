@@ -21,8 +21,8 @@ from onespp.denoise.stream import denoise_sequence
 from onespp.denoise.svgf import Svgf
 from onespp.denoise.tune import Search, starting_point
 from onespp.render.errors import InputError
-from onespp.render.manifest import Manifest
-from onespp.render.sequence import Sequence
+from onespp.render.files.manifest import Manifest
+from onespp.render.files.sequence import Sequence
 
 from .synthetic import make_frame
 from .test_compare import comparison, scores

@@ -17,7 +17,7 @@ from onespp.denoise.pictures import display_error
 from onespp.denoise.report import EDGES, render_page, write_report
 from onespp.denoise.score import score
 from onespp.render.errors import InputError
-from onespp.render.sequence import Sequence
+from onespp.render.files.sequence import Sequence
 
 from .report_sequence import CHANNELS, COUNT, METHODS, make_report_sequence
 from .small_sequence import contents

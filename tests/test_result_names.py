@@ -18,9 +18,9 @@ from onespp.denoise.stream import denoise_sequence
 from onespp.denoise.summary import table_data
 from onespp.denoise.table import print_scores
 from onespp.render.errors import InputError
+from onespp.render.files.manifest import Run, check_result_name
+from onespp.render.files.sequence import Sequence
 from onespp.render.games202 import import_result
-from onespp.render.manifest import Run, check_result_name
-from onespp.render.sequence import Sequence
 
 from .made_sequence import make_sequence
 from .report_sequence import make_report_sequence

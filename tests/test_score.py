@@ -16,8 +16,8 @@ from onespp.denoise.score import score
 from onespp.denoise.scorecard import INPUT, read_scores
 from onespp.denoise.table import caption, print_scores
 from onespp.render.errors import InputError
-from onespp.render.manifest import Run
-from onespp.render.sequence import Sequence
+from onespp.render.files.manifest import Run
+from onespp.render.files.sequence import Sequence
 
 from .made_sequence import COUNT, HEIGHT, METHODS, SPP, WIDTH, make_sequence, truth
 

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from onespp.render.errors import InputError
-from onespp.render.exr import read_header
+from onespp.render.files.exr import read_header
+from onespp.render.files.manifest import Manifest, Run, format_frames, parse_frames
+from onespp.render.files.matrices import format_matrices, read_matrices
+from onespp.render.files.sequence import Reference, Sequence
 from onespp.render.frame import Frame
-from onespp.render.manifest import Manifest, Run, format_frames, parse_frames
-from onespp.render.matrices import format_matrices, read_matrices
-from onespp.render.sequence import Reference, Sequence
 
 from .small_sequence import (
     HEIGHT,

@@ -9,8 +9,8 @@ import pytest
 from onespp.denoise.stream import ALONE, Pace, denoise_sequence
 from onespp.denoise.temporal import Temporal
 from onespp.render.errors import InputError
-from onespp.render.manifest import Manifest
-from onespp.render.sequence import Sequence
+from onespp.render.files.manifest import Manifest
+from onespp.render.files.sequence import Sequence
 
 from .synthetic import make_frame, noisy, translation
 

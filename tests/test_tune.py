@@ -10,9 +10,9 @@ from onespp.denoise.methods import build
 from onespp.denoise.tonemap import srgb_from_linear
 from onespp.denoise.tune import Case, Search, mean_psnr, neighbours, starting_point
 from onespp.render.channels import FRAME
+from onespp.render.files.manifest import Manifest
+from onespp.render.files.sequence import Reference, Sequence
 from onespp.render.frame import Frame
-from onespp.render.manifest import Manifest
-from onespp.render.sequence import Reference, Sequence
 
 from .synthetic import make_frame, noisy
 

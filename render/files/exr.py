@@ -28,8 +28,9 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from onespp.render.errors import InputError
+
 from .atomic import read_bytes, write_bytes
-from .errors import InputError
 
 _MAGIC = b"\x76\x2f\x31\x01"
 _TYPES = (np.dtype(np.uint32), np.dtype(np.float16), np.dtype(np.float32))

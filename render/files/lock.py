@@ -20,9 +20,10 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from onespp.render.errors import InputError
+
 from .atomic import explain
 from .cleaning import check_links, remove_leftovers
-from .errors import InputError
 from .manifest import check_result_name
 
 try:

@@ -18,8 +18,9 @@ from pydantic import (
     field_validator,
 )
 
-from .channels import CHANNELS
-from .errors import InputError
+from onespp.render.channels import CHANNELS
+from onespp.render.errors import InputError
+
 from .json_file import JsonFile
 
 FORMAT = 1

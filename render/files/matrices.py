@@ -13,7 +13,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, FiniteFloat
 
-from .errors import InputError
+from onespp.render.errors import InputError
+
 from .json_file import JsonFile, read_json
 
 _Row = Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)]

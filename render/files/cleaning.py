@@ -7,8 +7,9 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from onespp.render.errors import InputError
+
 from .atomic import is_temporary
-from .errors import InputError
 
 _OWN = re.compile(r"scores\.(json|csv)|times\.json|pictures/[^/]+\.(png|mp4)"
                   r"|frames/\d{4,}\.(exr|json)"

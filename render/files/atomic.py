@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .errors import InputError
+from onespp.render.errors import InputError
 
 
 def temporary_name(path: Path) -> Path:

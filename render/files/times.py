@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import FiniteFloat
 
-from onespp.render.json_file import JsonFile, read_json
+from .json_file import JsonFile, read_json
 
 
 class MethodTime(JsonFile):

@@ -10,8 +10,9 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from onespp.render.errors import InputError
+
 from .atomic import read_bytes
-from .errors import InputError
 
 
 class JsonFile(BaseModel):

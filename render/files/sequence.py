@@ -24,12 +24,13 @@ from pathlib import Path
 
 import numpy as np
 
+from onespp.render.channels import CHANNELS
+from onespp.render.errors import InputError
+from onespp.render.frame import Frame
+
 from .atomic import read_bytes, write_bytes, write_text
-from .channels import CHANNELS
 from .cleaning import remove_files, remove_sequence
-from .errors import InputError
 from .exr import read_exr, read_header, write_exr
-from .frame import Frame
 from .json_file import format_json, read_json
 from .manifest import Manifest, Run, check_result_name, first_difference
 from .matrices import format_matrices, read_matrices

@@ -1,0 +1,1 @@
+"""Sequences on disk: images, matrices, manifests; whole or not there."""
