@@ -15,7 +15,7 @@ from onespp.render.command import device_option, threads_option, use
 from onespp.render.errors import InputError
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import Sequence
-from onespp.render.games202_files import gaps
+from onespp.render.games202.layout import gaps
 from onespp.render.terminal import command_line, note, progress
 
 from .parameters import pairs

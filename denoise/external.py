@@ -17,7 +17,7 @@ from pathlib import Path
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Run, check_result_name
 from onespp.render.files.sequence import Sequence
-from onespp.render.games202 import export_games202, import_result
+from onespp.render.games202.convert import export_games202, import_result
 from onespp.render.host.machine import machine
 from onespp.render.terminal import readable
 

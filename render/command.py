@@ -153,8 +153,8 @@ def import_(folder: Path, out: Path | None, fps: float, check: bool, overwrite: 
     FOLDER has beauty_0.exr and so on, or a folder `input` that has. Results (result_0.exr; or in
     `output`) and references (reference_0.exr; or in `reference`) beside them come along.
     """
-    from .games202 import import_games202
-    from .games202_files import find_files
+    from onespp.render.games202.convert import import_games202
+    from onespp.render.games202.layout import find_files
 
     out = out or Path("data") / find_files(folder).name
     notes: list[str] = []
@@ -173,7 +173,7 @@ def import_(folder: Path, out: Path | None, fps: float, check: bool, overwrite: 
 @FORMATS
 def export(folder: Path, out: Path | None, layout: str) -> None:
     """Write the frames of the sequence in FOLDER in another layout."""
-    from .games202 import export_games202
+    from onespp.render.games202.convert import export_games202
 
     sequence = Sequence.open(folder)
     out = out or folder / layout

@@ -36,7 +36,7 @@ from onespp.render.errors import InputError
 from onespp.render.files import exr
 from onespp.render.files.sequence import Sequence
 from onespp.render.files.times import read_times
-from onespp.render.games202 import export_games202, import_games202, read_mat
+from onespp.render.games202.convert import export_games202, import_games202, read_mat
 from onespp.scenes import catalog
 from onespp.scenes.description import SceneError
 

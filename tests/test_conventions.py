@@ -8,11 +8,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from onespp.render.conventions import check_frame, check_motion
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence
 from onespp.render.frame import Frame
-from onespp.render.games202 import export_games202, import_games202
+from onespp.render.games202.conventions import check_frame, check_motion
+from onespp.render.games202.convert import export_games202, import_games202
 from onespp.render.job import RenderJob, render_sequence
 from onespp.scenes import catalog
 from onespp.scenes.hard import HARD

@@ -16,7 +16,7 @@ from onespp.render.errors import InputError
 from onespp.render.files.exr import read_exr, write_exr
 from onespp.render.files.sequence import Sequence
 from onespp.render.frame import Frame
-from onespp.render.games202 import (
+from onespp.render.games202.convert import (
     export_games202,
     export_results,
     import_games202,

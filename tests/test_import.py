@@ -17,8 +17,8 @@ from onespp.render.errors import InputError
 from onespp.render.files.exr import write_exr
 from onespp.render.files.manifest import Manifest
 from onespp.render.files.sequence import Sequence
-from onespp.render.games202 import RESULTS, export_games202, import_games202
-from onespp.render.games202_files import gaps
+from onespp.render.games202.convert import RESULTS, export_games202, import_games202
+from onespp.render.games202.layout import gaps
 
 from .report_sequence import HEIGHT, WIDTH, make_report_sequence
 from .synthetic import make_frame, noisy, translation

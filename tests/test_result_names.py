@@ -20,7 +20,7 @@ from onespp.denoise.table import print_scores
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Run, check_result_name
 from onespp.render.files.sequence import Sequence
-from onespp.render.games202 import import_result
+from onespp.render.games202.convert import import_result
 
 from .made_sequence import make_sequence
 from .report_sequence import make_report_sequence

@@ -22,8 +22,8 @@ from itertools import product
 
 import numpy as np
 
-from .errors import InputError
-from .frame import Frame
+from onespp.render.errors import InputError
+from onespp.render.frame import Frame
 
 FEWEST = 16  # pixels that say something
 _MOST = 20_000

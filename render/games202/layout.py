@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from .errors import InputError
+from onespp.render.errors import InputError
 
 STEMS = ("beauty", "normal", "position", "depth", "ID", "matrix")
 _INPUT = "input"

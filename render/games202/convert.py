@@ -31,16 +31,16 @@ from pathlib import Path
 
 import numpy as np
 
+from onespp.render.errors import InputError
 from onespp.render.files.atomic import all_or_none, read_bytes, write_bytes
 from onespp.render.files.exr import read_exr, read_header, write_exr
 from onespp.render.files.json_file import checked
 from onespp.render.files.manifest import Manifest, Run, check_result_name, format_frames
 from onespp.render.files.sequence import Reference, Sequence, object_ids
+from onespp.render.frame import Frame
 
 from .conventions import check_frame, check_motion
-from .errors import InputError
-from .frame import Frame
-from .games202_files import STEMS, Found, find_files, gaps, numbered
+from .layout import STEMS, Found, find_files, gaps, numbered
 
 _RGB = ("R", "G", "B")
 _FILES = {"color": ("beauty", _RGB), "normal": ("normal", _RGB), "position": ("position", _RGB),

@@ -1,0 +1,1 @@
+"""The layout of the GAMES202 assignment: found, checked, read and written."""
