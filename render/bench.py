@@ -12,11 +12,11 @@ import click
 import drjit as dr
 import numpy as np
 
+from onespp.render.mitsuba.variant import mi
 from onespp.scenes import catalog
 
 from .renderer import Renderer
 from .terminal import run
-from .variant import mi
 
 WARM_UP = 2
 AOVS = "albedo:albedo,N:sh_normal,P:position,Z:depth,ID:shape_index"

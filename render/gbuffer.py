@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import drjit as dr
 
-from .stage import Stage
-from .variant import mi
+from onespp.render.mitsuba.scene import Stage
+from onespp.render.mitsuba.variant import mi
 
 
 @dataclass

@@ -22,10 +22,11 @@ from typing import TYPE_CHECKING
 import drjit as dr
 import numpy as np
 
+from onespp.render.mitsuba.variant import mi
+
 from .path import trace
 from .rays import camera_matrices, pixel_rays
 from .sampler import FRAME_STREAM, GRADIENT_STREAM, keys_from_seed
-from .variant import mi
 
 if TYPE_CHECKING:
     from .renderer import Renderer

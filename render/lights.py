@@ -29,9 +29,10 @@ from dataclasses import dataclass
 
 import drjit as dr
 
+from onespp.render.mitsuba.variant import mi
+
 from .mis import power_heuristic
 from .sampler import Sampler
-from .variant import mi
 
 GRID = 4
 DELTA = 0.1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import drjit as dr
 
-from .variant import mi
+from onespp.render.mitsuba.variant import mi
 
 
 def power_heuristic(p: mi.Float, q: mi.Float) -> mi.Float:

@@ -17,10 +17,11 @@ from dataclasses import dataclass
 
 import drjit as dr
 
+from onespp.render.mitsuba.variant import mi
+
 from .lights import DirectLight, resample_lights, shape_index
 from .mis import power_heuristic
 from .sampler import Sampler
-from .variant import mi
 
 
 @dataclass

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import drjit as dr
 import numpy as np
 
+from onespp.render.mitsuba.scene import Stage
+from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Camera
-
-from .stage import Stage
-from .variant import mi
 
 
 @dataclass(frozen=True)

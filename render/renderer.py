@@ -8,6 +8,8 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
+from onespp.render.mitsuba.scene import Stage
+from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Scene
 
 from .channels import FRAME, GLOSS, RADIANCE, REPLAY, SHADOW, SPLIT
@@ -28,8 +30,6 @@ from .sampler import (
     keys_from_seed,
     z_order,
 )
-from .stage import Stage
-from .variant import mi
 
 DIRECT = ("mis", "resampled")
 SAMPLERS: dict[str, Callable[[Keys, Any, int], Sampler]] = {

@@ -15,8 +15,9 @@ from typing import ClassVar, Protocol
 import drjit as dr
 import numpy as np
 
+from onespp.render.mitsuba.variant import mi
+
 from . import bluenoise
-from .variant import mi
 
 FRAME_STREAM, REFERENCE_STREAM, GRADIENT_STREAM = 0, 1, 2
 

@@ -95,7 +95,7 @@ def _kernel(folder: Path) -> str:
 
 
 def _mitsuba(folder: Path) -> str:
-    from .variant import mi
+    from onespp.render.mitsuba.variant import mi
 
     scene = mi.load_dict({
         "type": "scene", "integrator": {"type": "path"}, "light": {"type": "constant"},

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from onespp.render.channels import GBUFFER
+from onespp.render.mitsuba.variant import mi
 from onespp.render.rays import pixel_rays
 from onespp.render.renderer import Renderer
-from onespp.render.variant import mi
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.transforms import look_at, rotate, scale, translate
 

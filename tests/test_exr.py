@@ -132,7 +132,7 @@ def test_a_large_constant_image_is_not_taken_for_a_bomb(tmp_path):
 
 
 def test_mitsuba_opens_our_files_and_sees_the_layers(tmp_path):
-    from onespp.render.variant import mi  # sets the variant that later tests render with
+    from onespp.render.mitsuba.variant import mi  # sets the variant that later tests render with
 
     written = {name: image for name, image in planes().items() if name != "count"}
     write_exr(tmp_path / "a.exr", written, {"scene": "box"})

@@ -11,7 +11,7 @@ from PIL import Image
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence
 from onespp.render.job import RenderJob, render_sequence
-from onespp.render.variant import mi
+from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Camera, Mesh
 from onespp.scenes.fingerprint import fingerprint
 from onespp.scenes.transforms import look_at, translate

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from onespp.render.mitsuba.variant import mi
 from onespp.render.renderer import Renderer
-from onespp.render.variant import mi
 from onespp.scenes import catalog
 
 from .furnace import furnace

@@ -12,10 +12,10 @@ import onespp.render.reference
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence
 from onespp.render.job import RenderJob, render_sequence
+from onespp.render.mitsuba.variant import mi
 from onespp.render.reference import Progress, pass_sizes, render_reference
 from onespp.render.renderer import Renderer
 from onespp.render.sampler import Sobol, keys_from_seed
-from onespp.render.variant import mi
 
 from .furnace import furnace
 from .test_renderer import small_scene

@@ -10,8 +10,8 @@ import pytest
 
 from onespp.render.channels import FRAME
 from onespp.render.errors import InputError
+from onespp.render.mitsuba.variant import mi
 from onespp.render.renderer import Renderer
-from onespp.render.variant import mi
 from onespp.scenes import catalog
 from onespp.scenes.description import Camera, Mesh, Rectangle, Scene, SceneError, Shape, Sphere
 from onespp.scenes.transforms import look_at, rotate, scale, translate

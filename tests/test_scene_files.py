@@ -173,7 +173,7 @@ def test_an_import_that_comes_too_late_is_one_sentence(tmp_path):
 
 
 def pictures(folder: Path) -> None:
-    from onespp.render.variant import mi
+    from onespp.render.mitsuba.variant import mi
 
     mi.Bitmap(np.full((2, 4, 3), 0.25, np.float32)).write(str(folder / "tex.exr"))
     mi.Bitmap(np.full((2, 4, 3), 3, np.float32)).write(str(folder / "sky.exr"))

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from onespp.render.errors import InputError
+from onespp.render.mitsuba.scene import Stage
 from onespp.render.renderer import Renderer
-from onespp.render.stage import Stage
 from onespp.scenes import meshes
 from onespp.scenes.description import (
     Camera,
@@ -262,7 +262,7 @@ def test_environment_is_the_same_in_any_form(environment):
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 3), (2, 2), (5, 4)])
 def test_environment_image_of_any_size_and_file(size, tmp_path):
-    from onespp.render.variant import mi
+    from onespp.render.mitsuba.variant import mi
 
     pixels = np.random.default_rng(1).random((*size, 3)).astype(np.float32)
     mi.Bitmap(pixels).write(str(tmp_path / "sky.exr"))
@@ -281,7 +281,7 @@ def test_environment_that_cannot_be_is_refused(environment, words):
 
 
 def test_values_in_image_files_are_checked_too(tmp_path):
-    from onespp.render.variant import mi
+    from onespp.render.mitsuba.variant import mi
 
     for name, value in (("bright", 2.0), ("negative", -1.0), ("nan", np.nan)):
         path = tmp_path / f"{name}.exr"

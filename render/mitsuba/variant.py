@@ -10,8 +10,8 @@ from typing import Any
 
 import mitsuba
 
-from .errors import InputError
-from .host import backend
+from onespp.render.errors import InputError
+from onespp.render.host import backend
 
 VARIANTS = {"llvm": "llvm_ad_rgb", "cuda": "cuda_ad_rgb"}
 

@@ -1,0 +1,1 @@
+"""A scene description as live Mitsuba objects, and what materials say of themselves."""
