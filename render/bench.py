@@ -13,9 +13,9 @@ import drjit as dr
 import numpy as np
 
 from onespp.render.mitsuba.variant import mi
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 
-from .renderer import Renderer
 from .terminal import run
 
 WARM_UP = 2

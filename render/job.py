@@ -17,13 +17,13 @@ from onespp.render.files.sequence import Sequence as FrameSequence
 from onespp.render.files.sequence import another
 from onespp.render.host.machine import machine
 from onespp.render.host.versions import versions
+from onespp.render.tracer.reference import Progress, pass_sizes, render_reference
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Scene
 from onespp.scenes.fingerprint import fingerprint, later_fingerprints
 
 from .errors import InputError
 from .host import backend
-from .reference import Progress, pass_sizes, render_reference
-from .renderer import Renderer
 
 SECONDS_BETWEEN_SAVES = 10.0
 

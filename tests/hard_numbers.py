@@ -16,7 +16,7 @@ from onespp.denoise.methods import METHODS, build, parameters
 from onespp.denoise.surface import GUIDES
 from onespp.denoise.temporal import Temporal
 from onespp.render.frame import Frame
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.hard import HARD
 
 from .synthetic import make_frame, noisy, translation, turn, with_images

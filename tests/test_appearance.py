@@ -8,8 +8,8 @@ import pytest
 
 from onespp.render.channels import GBUFFER
 from onespp.render.mitsuba.variant import mi
-from onespp.render.rays import pixel_rays
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.camera_rays import pixel_rays
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.transforms import look_at, rotate, scale, translate
 

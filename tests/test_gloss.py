@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from onespp.render.channels import FRAME, GLOSS
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 from onespp.scenes.description import Rectangle, Shape
 from onespp.scenes.materials import diffuse, metal, varnish

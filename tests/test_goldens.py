@@ -13,8 +13,8 @@ import pytest
 from PIL import Image
 
 from onespp.denoise.tonemap import bytes_from_linear
-from onespp.render.reference import Progress
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.reference import Progress
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 
 from .z_test import assert_same_mean

@@ -3,9 +3,9 @@ import pytest
 
 from onespp.render.channels import FRAME, REPLAY
 from onespp.render.files.manifest import parse_frames
-from onespp.render.gradient import replay
 from onespp.render.job import RenderJob, render_sequence
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.renderer import Renderer
+from onespp.render.tracer.replay import replay
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.transforms import look_at, rotate, scale, translate
 

@@ -25,8 +25,8 @@ from onespp.render.files.lock import writing
 from onespp.render.files.manifest import Run
 from onespp.render.files.sequence import Reference, Sequence
 from onespp.render.host import backend, doctor, memory
-from onespp.render.reference import Progress
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.reference import Progress
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 from onespp.scenes.description import SceneError
 

@@ -15,7 +15,7 @@ from onespp.denoise.stencil import Stencil
 from onespp.denoise.surface import repair
 from onespp.denoise.window_moments import RowPass, window_moments
 from onespp.render.channels import REPLAY
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.hard import HARD
 
 from .hard_numbers import (

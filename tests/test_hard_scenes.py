@@ -14,8 +14,8 @@ from onespp.denoise.hard import INPUT, Row, judge, markdown, misses, run_alone
 from onespp.denoise.methods import METHODS, build, parameters
 from onespp.render.channels import REPLAY
 from onespp.render.job import RenderJob, render_sequence
-from onespp.render.rays import camera_matrices
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.camera_rays import camera_matrices
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.catalog import SCENES, load
 from onespp.scenes.description import Mesh, Rectangle, SceneError, Sphere
 from onespp.scenes.hard import HARD

@@ -7,7 +7,7 @@ import pytest
 
 from onespp.render.channels import FRAME, SPLIT
 from onespp.render.errors import InputError
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 
 from .test_renderer import small_scene

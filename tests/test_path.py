@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from onespp.render.mitsuba.variant import mi
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 
 from .furnace import furnace

@@ -13,7 +13,7 @@ from onespp.denoise.penumbra import PenumbraSample, footprint_falloff, light_siz
 from onespp.denoise.shadow_motion import follow_shadows, read_shadow_rays
 from onespp.denoise.stencil import Stencil
 from onespp.denoise.surface import read_surface
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Rectangle, Shape
 from onespp.scenes.transforms import look_at, rotate, scale, translate
 

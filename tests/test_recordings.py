@@ -8,7 +8,7 @@ import drjit as dr
 import pytest
 
 from onespp.render.channels import FRAME, GLOSS, REPLAY, SHADOW, SPLIT
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 from onespp.scenes.description import Camera, Cylinder, Disk, Mesh, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.transforms import look_at, rotate, scale, translate

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import onespp.render.job
-import onespp.render.reference
+import onespp.render.tracer.reference
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence
 from onespp.render.job import RenderJob, render_sequence
 from onespp.render.mitsuba.variant import mi
-from onespp.render.reference import Progress, pass_sizes, render_reference
-from onespp.render.renderer import Renderer
-from onespp.render.sampler import Sobol, keys_from_seed
+from onespp.render.tracer.reference import Progress, pass_sizes, render_reference
+from onespp.render.tracer.renderer import Renderer
+from onespp.render.tracer.sampler import Sobol, keys_from_seed
 
 from .furnace import furnace
 from .test_renderer import small_scene
@@ -188,7 +188,7 @@ def test_a_damaged_reference_of_more_samples_is_made_anew(tmp_path):
     (24, 24, 8)])    # 8 passes of 3: anew
 def test_what_an_interrupt_left_of_a_better_reference_is_used(tmp_path, monkeypatch, asked, spp,
                                                               traced):
-    monkeypatch.setattr(onespp.render.reference, "LARGEST_PASS", 4)
+    monkeypatch.setattr(onespp.render.tracer.reference, "LARGEST_PASS", 4)
     scene, real, passes = small_scene(), Renderer.sample_sum, []
 
     def counted(self, *arguments):
@@ -221,7 +221,7 @@ def test_an_edited_scene_is_not_taken_for_the_old_one(tmp_path):
 @pytest.mark.parametrize(("more", "passes"), [(48, 4), (33, 9)])
 def test_a_reference_of_more_samples_goes_on_from_the_one_of_fewer(tmp_path, monkeypatch, more,
                                                                    passes):
-    monkeypatch.setattr(onespp.render.reference, "LARGEST_PASS", 4)
+    monkeypatch.setattr(onespp.render.tracer.reference, "LARGEST_PASS", 4)
     real, numbers = Renderer.sample_sum, []
 
     def counted(self, index, seed, number, *arguments):

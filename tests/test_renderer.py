@@ -11,7 +11,7 @@ import pytest
 from onespp.render.channels import FRAME
 from onespp.render.errors import InputError
 from onespp.render.mitsuba.variant import mi
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 from onespp.scenes.description import Camera, Mesh, Rectangle, Scene, SceneError, Shape, Sphere
 from onespp.scenes.transforms import look_at, rotate, scale, translate

@@ -181,7 +181,7 @@ def pictures(folder: Path) -> None:
 
 @pytest.mark.parametrize("named", ["relative", "from elsewhere"])
 def test_files_are_found_from_the_scenes_folder(tmp_path, monkeypatch, named):
-    from onespp.render.renderer import Renderer
+    from onespp.render.tracer.renderer import Renderer
 
     texture = '{"type": "diffuse", "reflectance": {"type": "bitmap", "filename": "tex.exr"}}'
     path = write(tmp_path / "s", parts="COLOR = (0, 0, 0)", mine=FILE.replace(

@@ -13,7 +13,7 @@ import pytest
 
 from onespp.render.errors import InputError
 from onespp.render.mitsuba.scene import Stage
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import meshes
 from onespp.scenes.description import (
     Camera,

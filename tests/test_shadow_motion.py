@@ -13,7 +13,7 @@ from onespp.denoise.stencil import Stencil
 from onespp.denoise.surface import read_surface
 from onespp.render.channels import FRAME, SHADOW, SPLIT
 from onespp.render.errors import InputError
-from onespp.render.renderer import Renderer
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Rectangle, Shape, Sphere
 from onespp.scenes.transforms import look_at, rotate, scale, translate
 from tests import innovation_oracle

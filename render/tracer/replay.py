@@ -24,8 +24,8 @@ import numpy as np
 
 from onespp.render.mitsuba.variant import mi
 
+from .camera_rays import camera_matrices, pixel_rays
 from .path import trace
-from .rays import camera_matrices, pixel_rays
 from .sampler import FRAME_STREAM, GRADIENT_STREAM, keys_from_seed
 
 if TYPE_CHECKING:

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onespp.render.errors import InputError
 from onespp.render.files.sequence import Reference
 
-from .errors import InputError
 from .renderer import Renderer
 
 LARGEST_PASS = 64  # samples; float32 sums inside a pass stay exact to ~1e-6

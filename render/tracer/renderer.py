@@ -8,17 +8,17 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
+from onespp.render.channels import FRAME, GLOSS, RADIANCE, REPLAY, SHADOW, SPLIT
+from onespp.render.errors import InputError
+from onespp.render.frame import Frame
 from onespp.render.mitsuba.scene import Stage
 from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Scene
 
-from .channels import FRAME, GLOSS, RADIANCE, REPLAY, SHADOW, SPLIT
-from .errors import InputError
-from .frame import Frame
+from .camera_rays import camera_matrices, pixel_rays
 from .gbuffer import GBUFFER, PrimaryHit
-from .gradient import replay
 from .path import trace
-from .rays import camera_matrices, pixel_rays
+from .replay import replay
 from .sampler import (
     FRAME_STREAM,
     REFERENCE_STREAM,

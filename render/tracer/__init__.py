@@ -1,0 +1,1 @@
+"""The path tracer: frames, references and replayed samples."""
