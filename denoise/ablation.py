@@ -14,10 +14,10 @@ from typing import Any
 
 import click
 
-from onespp.render.command import device_option, threads_option, use
+from onespp.render.cli.render import device_option, threads_option, use
+from onespp.render.cli.terminal import progress, run
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence
-from onespp.render.terminal import progress, run
 
 from .ground import read_ground
 from .judge import Judge

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import click
 
-from onespp.render.arguments import parse_size
-from onespp.render.command import device_option, threads_option, use
-from onespp.render.terminal import progress
+from onespp.render.cli.arguments import parse_size
+from onespp.render.cli.render import device_option, threads_option, use
+from onespp.render.cli.terminal import progress
 
 from .json_option import json_option, show_or_print
 

@@ -11,12 +11,12 @@ import click
 from click.core import ParameterSource
 
 from onespp.render.channels import REPLAY, SPLIT
-from onespp.render.command import device_option, threads_option, use
+from onespp.render.cli.render import device_option, threads_option, use
+from onespp.render.cli.terminal import command_line, note, progress
 from onespp.render.errors import InputError
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import Sequence
 from onespp.render.games202.layout import gaps
-from onespp.render.terminal import command_line, note, progress
 
 from .parameters import pairs
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import click
 
+from onespp.render.cli.terminal import run
 from onespp.render.errors import InputError
-from onespp.render.terminal import run
 
 from .scorecard import MethodScore, Scores, read_scores
 

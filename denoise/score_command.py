@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 
+from onespp.render.cli.terminal import command_line, named_progress
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import Sequence
-from onespp.render.terminal import command_line, named_progress
 
 from .json_option import json_option, show_or_print
 

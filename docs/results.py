@@ -38,16 +38,16 @@ from onespp.denoise.score import score
 from onespp.denoise.scorecard import INPUT, MethodScore, Scores
 from onespp.denoise.stream import denoise_sequence
 from onespp.denoise.tonemap import TONE_MAP
-from onespp.render.arguments import parse_size
 from onespp.render.channels import REPLAY
-from onespp.render.command import use
+from onespp.render.cli.arguments import parse_size
+from onespp.render.cli.render import use
+from onespp.render.cli.terminal import run as run_command
 from onespp.render.errors import InputError
 from onespp.render.files.lock import writing
 from onespp.render.files.manifest import format_frames, parse_frames
 from onespp.render.files.sequence import Sequence as FrameSequence
 from onespp.render.files.times import read_times
 from onespp.render.job import RenderJob, render_sequence
-from onespp.render.terminal import run as run_command
 from onespp.scenes import catalog
 from onespp.scenes.hard import HARD
 

@@ -11,13 +11,13 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
-import onespp.render.command
+import onespp.render.cli.render
 from onespp.denoise.bench_command import bench
 from onespp.denoise.command import DEFAULT_METHODS, denoise, denoise_in, time_
 from onespp.denoise.score_command import compare, report, score, score_in
 from onespp.denoise.tune_command import tune
-from onespp.render.terminal import BAD_INPUT, Steps, progress
-from onespp.render.terminal import run as run_command
+from onespp.render.cli.terminal import BAD_INPUT, Steps, progress
+from onespp.render.cli.terminal import run as run_command
 
 REFERENCE_SPP = 256
 
@@ -53,8 +53,8 @@ def scenes() -> None:
               show_default=True, help="Folder of the sequences.")
 @click.option("--reference-spp", type=int, default=REFERENCE_SPP, show_default=True, metavar="N",
               help="Samples a pixel of the ground truth.")
-@onespp.render.command.device_option
-@onespp.render.command.threads_option
+@onespp.render.cli.render.device_option
+@onespp.render.cli.render.threads_option
 def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
          threads: int | None) -> None:
     """Try every method on hard scenes (all, or those named), and print a table in Markdown.
@@ -62,7 +62,7 @@ def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
     Renders what is missing. For each scene and method: error, what its history gains, how soon it
     recovers from a sudden change, and whether it keeps the energy.
     """
-    onespp.render.command.use(device, threads)
+    onespp.render.cli.render.use(device, threads)
     from onespp.denoise.hard import markdown
     from onespp.scenes.hard import HARD
 
@@ -111,14 +111,14 @@ def _within(steps: Steps, number: int, name: str, part: float) -> None:
               help="Folder of the sequence; default data/SCENE.")
 @click.option("--method", "methods", multiple=True, metavar="NAME", default=DEFAULT_METHODS,
               show_default=True, help="As for `denoise`; may be given several times.")
-@onespp.render.command.render_options
+@onespp.render.cli.render.render_options
 @click.pass_context
 def run(context: click.Context, scene: str, out: Path | None, methods: tuple[str, ...],
         device: str, threads: int | None, reference_spp: int | None, **options) -> None:
     """Render SCENE with ground truth, denoise it and score the result."""
-    onespp.render.command.use(device, threads)
+    onespp.render.cli.render.use(device, threads)
     spp = REFERENCE_SPP if reference_spp is None else reference_spp
-    sequence = onespp.render.command.render_to(scene, out, reference_spp=spp, **options)
+    sequence = onespp.render.cli.render.render_to(scene, out, reference_spp=spp, **options)
     default = context.get_parameter_source("methods") == ParameterSource.DEFAULT
     denoise_in(sequence.folder, methods, default=default)
     score_in(sequence.folder)
@@ -137,8 +137,8 @@ def doctor() -> None:
         sys.exit(BAD_INPUT)
 
 
-for command in (onespp.render.command.render, denoise, time_, score, report, compare, bench, tune,
-                onespp.render.command.import_, onespp.render.command.export):
+for command in (onespp.render.cli.render.render, denoise, time_, score, report, compare, bench, tune,
+                onespp.render.cli.render.import_, onespp.render.cli.render.export):
     app.add_command(command)
 
 

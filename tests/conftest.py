@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from onespp.cli import app
-from onespp.render.terminal import run as run_command
+from onespp.render.cli.terminal import run as run_command
 
 sys.path.insert(0, str(Path(__file__).parent))
 

@@ -3,10 +3,10 @@ import pytest
 
 from onespp.denoise.ablation import ablate, ablation, markdown, variants
 from onespp.denoise.methods import parameters
+from onespp.render.cli.terminal import run
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest
 from onespp.render.files.sequence import Reference, Sequence
-from onespp.render.terminal import run
 
 from .synthetic import make_frame, noisy
 

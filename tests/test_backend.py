@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from onespp.render.arguments import parse_size
+from onespp.render.cli.arguments import parse_size
 from onespp.render.errors import InputError
 from onespp.render.host import backend
 from onespp.render.trials import TRIALS, TrialError, attempt

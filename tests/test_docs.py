@@ -22,7 +22,7 @@ from sphinx.cmd.build import build_main
 import onespp.cli
 import onespp.denoise.ablation
 import onespp.denoise.lead
-import onespp.render.bench
+import onespp.render.cli.bench
 from onespp.denoise.methods import METHODS, build, parameters
 from onespp.denoise.outliers import RemoveOutliers
 from onespp.denoise.parameters import pairs
@@ -55,7 +55,7 @@ TODAY = {
     "onespp.render.files.sequence import FrameSequence":
     "onespp.render.files.sequence import Sequence as FrameSequence", "onespp.scenes": "scenes"}
 APART = {"lead": onespp.denoise.lead.lead, "ablate": onespp.denoise.ablation.ablation,
-         "bench render": onespp.render.bench.bench}
+         "bench render": onespp.render.cli.bench.bench}
 
 
 def blocks(page: str, language: str) -> list[tuple[str, str]]:

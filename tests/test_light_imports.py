@@ -10,7 +10,7 @@ import pytest
 
 MAPS = Path("/proc/self/maps")
 LIGHT = (
-    "render", "onespp.render.files.sequence", "onespp.render.files.exr", "onespp.render.games202.convert", "onespp.render.command", "denoise",
+    "render", "onespp.render.files.sequence", "onespp.render.files.exr", "onespp.render.games202.convert", "onespp.render.cli.render", "denoise",
     "onespp.denoise.metrics", "onespp.denoise.flip", "onespp.denoise.stability", "onespp.denoise.classes", "onespp.denoise.judge",
     "onespp.denoise.scorecard", "onespp.denoise.cost", "onespp.render.files.times", "onespp.denoise.compare", "onespp.denoise.pictures",
     "onespp.denoise.provenance", "onespp.denoise.score", "onespp.denoise.report", "onespp.denoise.command",

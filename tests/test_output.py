@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from onespp.render import terminal
+from onespp.render.cli import terminal
 
 from .report_sequence import make_report_sequence
 

@@ -116,7 +116,7 @@ def test_files_of_before_commands_were_recorded_still_open(tmp_path):
 
 @pytest.mark.parametrize("arguments", [["scenes"], []])
 def test_a_command_that_makes_nothing_records_nothing(call, arguments):
-    from onespp.render.terminal import command_line
+    from onespp.render.cli.terminal import command_line
 
     call(*arguments)
     assert command_line() == ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from .errors import InputError
+from onespp.render.errors import InputError
 
 LARGEST_SIDE = 16384
 

@@ -23,7 +23,7 @@ from rich.progress import (
 )
 from rich.progress import Progress as Bar
 
-from .errors import InputError
+from onespp.render.errors import InputError
 
 SECONDS_BETWEEN_LINES = 5.0
 BAD_INPUT, INTERRUPTED = 2, 130

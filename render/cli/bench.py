@@ -1,4 +1,4 @@
-"""`python -m onespp.render.bench SCENE`: a frame with all channels against Mitsuba's `aov` around `path`.
+"""`python -m onespp.render.cli.bench SCENE`: a frame with all channels against Mitsuba's `aov` around `path`.
 
 The same channels at 512x512 and 1 spp, in turns, after a warm-up; medians.
 """
@@ -59,4 +59,4 @@ def bench(scene: str, side: int, repeats: int) -> None:
 
 
 if __name__ == "__main__":
-    run(bench, name="python -m onespp.render.bench")
+    run(bench, name="python -m onespp.render.cli.bench")

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import click
 
+from onespp.render.channels import FRAME, GLOSS, REPLAY, SHADOW, SPLIT
+from onespp.render.errors import InputError
 from onespp.render.files.lock import writing
 from onespp.render.files.manifest import parse_frames
 from onespp.render.files.sequence import Sequence
+from onespp.render.host import backend
 from onespp.render.host.memory import require_memory
 from onespp.scenes import catalog
 
 from .arguments import parse_size
-from .channels import FRAME, GLOSS, REPLAY, SHADOW, SPLIT
-from .errors import InputError
-from .host import backend
 from .terminal import command_line, progress
 
 
@@ -97,7 +97,7 @@ def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: st
         raise InputError(f"--seed is {seed}: use 0 or more")
     require_memory(height, width)
     names, added = _channel_names(channels)
-    from .job import RenderJob, kept_references, render_sequence  # imports Mitsuba
+    from onespp.render.job import RenderJob, kept_references, render_sequence  # imports Mitsuba
 
     job = RenderJob(scene, numbers, height, width, seed, reference_spp, antialias, names,
                     direct, sampler, command_line(), added)
