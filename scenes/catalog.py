@@ -10,10 +10,11 @@ import difflib
 from collections.abc import Callable
 from pathlib import Path
 
+from onespp.scenes.room.room import room
+
 from .box import box
 from .description import Scene, SceneError
 from .hard import HARD
-from .room import room
 from .scene_file import load_file
 
 SCENES: dict[str, Callable[[], Scene]] = {

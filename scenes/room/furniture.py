@@ -9,9 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from .description import Mesh
-from .meshes import box, ellipsoid, lathe, merge, paint, place, rounded_box, surface
-from .transforms import Vector, rotate, translate
+from onespp.scenes.description import Mesh
+from onespp.scenes.meshes import box, ellipsoid, lathe, merge, paint, place, rounded_box, surface
+from onespp.scenes.transforms import Vector, rotate, translate
 
 X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 

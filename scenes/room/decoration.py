@@ -7,10 +7,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from .description import Mesh
+from onespp.scenes.description import Mesh
+from onespp.scenes.meshes import (
+    box,
+    ellipsoid,
+    lathe,
+    merge,
+    paint,
+    place,
+    rounded_box,
+    surface,
+    torus,
+)
+from onespp.scenes.transforms import rotate, translate
+
 from .furniture import at, between, drum
-from .meshes import box, ellipsoid, lathe, merge, paint, place, rounded_box, surface, torus
-from .transforms import rotate, translate
 
 X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 

@@ -10,13 +10,15 @@ import math
 
 import numpy as np
 
-from . import decoration, furniture, materials, pictures, toys
-from .animation import Animation, compose, spin, swing
-from .cameras import looking
-from .description import Camera, Color, Rectangle, Scene, Shape, Sphere
-from .materials import diffuse, image, metal, palette, rgb, varnish
-from .meshes import merge, place
-from .transforms import Matrix, rotate, scale, translate
+from onespp.scenes import materials
+from onespp.scenes.animation import Animation, compose, spin, swing
+from onespp.scenes.cameras import looking
+from onespp.scenes.description import Camera, Color, Rectangle, Scene, Shape, Sphere
+from onespp.scenes.materials import diffuse, image, metal, palette, rgb, varnish
+from onespp.scenes.meshes import merge, place
+from onespp.scenes.transforms import Matrix, rotate, scale, translate
+
+from . import decoration, furniture, pictures, toys
 
 WIDTH, HEIGHT, BACK, FRONT = 6.0, 2.8, -2.7, 3.3
 PERIOD = 80  # frames after which everything but the train's wheels is where it was

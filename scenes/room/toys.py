@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .description import Mesh
+from onespp.scenes.description import Mesh
+from onespp.scenes.meshes import box, ellipsoid, lathe, merge, paint, place, rounded_box, torus
+from onespp.scenes.transforms import Vector, rotate, translate
+
 from .furniture import at, between, drum
-from .meshes import box, ellipsoid, lathe, merge, paint, place, rounded_box, torus
-from .transforms import Vector, rotate, translate
 
 X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 

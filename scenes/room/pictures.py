@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .materials import mix, noise, rgb
+from onespp.scenes.materials import mix, noise, rgb
 
 
 def wallpaper() -> np.ndarray:

@@ -1,0 +1,1 @@
+"""A pink living room with toys, and all that stands in it."""
