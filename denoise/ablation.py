@@ -14,6 +14,9 @@ from typing import Any
 
 import click
 
+from onespp.denoise.metrics.flicker import MEASURES
+from onespp.denoise.metrics.means import mean_over_frames
+from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.render.cli.render import device_option, threads_option, use
 from onespp.render.cli.terminal import progress, run
 from onespp.render.errors import InputError
@@ -21,10 +24,7 @@ from onespp.render.files.sequence import Sequence
 
 from .ground import read_ground
 from .judge import Judge
-from .means import mean_over_frames
 from .methods import Method, build, channels_read, parameters
-from .stability import MEASURES
-from .tonemap import TONE_MAP
 
 COLUMNS = ("psnr_srgb", "flip", "flicker")
 WHOLE = "as it is"

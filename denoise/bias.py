@@ -17,11 +17,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from onespp.denoise.metrics.table import pair, reference_floor
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import first_difference
 from onespp.render.files.sequence import Sequence
 
-from .metrics import pair, reference_floor
 from .scorecard import INPUT, ErrorSplit
 
 

@@ -25,14 +25,14 @@ from pydantic import FiniteFloat
 from rich.console import Console
 from rich.table import Table
 
+from onespp.denoise.metrics.flicker import MEASURES
+from onespp.denoise.metrics.means import identical
+from onespp.denoise.metrics.table import Metric
 from onespp.render.errors import InputError
 from onespp.render.files.json_file import JsonFile, format_json
 
-from .means import identical
-from .metrics import Metric
 from .parameters import present_parameters
 from .scorecard import MethodScore, Scores
-from .stability import MEASURES
 from .table import PLAIN_WIDTH
 
 TIME = Metric("ms", "time", lambda a, b: None, "", "ms", False, ".1f", "milliseconds a frame")

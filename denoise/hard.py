@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onespp.denoise.metrics.table import measure_pair, non_finite, pair, reference_floor
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence as Folder
 from onespp.render.frame import Frame
 
 from .methods import METHODS, Method
-from .metrics import measure_pair, non_finite, pair, reference_floor
 
 MARGIN = 0.3          # dB
 ENERGY_MARGIN = 0.02  # of the reference's mean

@@ -6,11 +6,12 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from onespp.denoise.metrics.flicker import MEASURES, STABILITY, Step
+from onespp.denoise.metrics.table import Pair, decibels, measure_pair, non_finite, pair
+
 from .classes import BACKGROUND, CAUSES, HISTORIES, history_class
 from .ground import Ground
-from .metrics import Pair, decibels, measure_pair, non_finite, pair
 from .scorecard import ClassScore, FrameScore
-from .stability import MEASURES, STABILITY, Step
 
 
 class Tally:

@@ -27,11 +27,11 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.metrics.luminance import luminance
 from onespp.render.frame import Frame
 
 from .arrays import Color, Float
 from .demodulation import Texture, read_texture
-from .luminance import luminance
 from .parameters import check_positive, check_whole
 from .stencil import Offset, Planes, Stencil, Step, Taps, window
 from .structure import evaluate

@@ -12,15 +12,15 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 from PIL import Image
 
+from onespp.denoise.metrics.table import HEADLINE, pair, spread
+from onespp.denoise.metrics.tonemap import bytes_from_linear
 from onespp.render.files.atomic import replacing
 from onespp.render.files.sequence import Sequence
 
-from .metrics import HEADLINE, pair, spread
 from .movie import MovieError, write_movie
 from .panels import GAP, error_legend, error_picture, panel, resize, scaled_size, tile
 from .plot import plot_speed_against_error
 from .scorecard import INPUT, Scores
-from .tonemap import bytes_from_linear
 
 SHEETS = 3
 WANTED, LARGE_ENOUGH, WIDEST = 480, 640, 3960  # widths in pixels: see `contact_sheet`

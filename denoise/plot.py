@@ -11,9 +11,9 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from onespp.denoise.metrics.table import HEADLINE
 from onespp.render.files.atomic import replacing
 
-from .metrics import HEADLINE
 from .scorecard import INPUT, Scores
 
 FAR = 8.0  # dB; a floor further above the best method would flatten what is to be compared

@@ -14,6 +14,17 @@ from typing import Any
 
 import numpy as np
 
+from onespp.denoise.metrics.flicker import MEASURES
+from onespp.denoise.metrics.means import identical, mean_decibels, mean_over_frames
+from onespp.denoise.metrics.table import (
+    HEADLINE,
+    METRICS,
+    PSNR_CAP,
+    non_finite,
+    reference_floor,
+    spread,
+)
+from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
 from onespp.render.files.manifest import format_frames
@@ -24,13 +35,9 @@ from .bias import split_errors
 from .cost import cost
 from .ground import read_ground
 from .judge import Judge
-from .means import identical, mean_decibels, mean_over_frames
-from .metrics import HEADLINE, METRICS, PSNR_CAP, non_finite, reference_floor, spread
 from .pictures import Progress, draw_pictures
 from .provenance import commands
 from .scorecard import INPUT, MethodScore, Scores
-from .stability import MEASURES
-from .tonemap import TONE_MAP
 
 MOST_LOST = 0.01
 """Share of a reference's pixels that may be non-finite; they count as no error in every image."""

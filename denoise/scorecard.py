@@ -14,10 +14,9 @@ from typing import Any
 
 from pydantic import ConfigDict, Field, FiniteFloat, field_validator, model_serializer
 
+from onespp.denoise.metrics.flicker import MEASURES
+from onespp.denoise.metrics.table import HEADLINE
 from onespp.render.files.json_file import JsonFile, format_json, read_json
-
-from .metrics import HEADLINE
-from .stability import MEASURES
 
 INPUT = "input"
 """The method that does nothing: the noisy frames themselves."""

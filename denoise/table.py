@@ -7,10 +7,11 @@ import sys
 from rich.console import Console
 from rich.table import Table
 
+from onespp.denoise.metrics.flicker import MEASURES
+from onespp.denoise.metrics.table import HEADLINE, Metric
+
 from .classes import CAUSES, HISTORIES
-from .metrics import HEADLINE, Metric
 from .scorecard import INPUT, MethodScore, Scores
-from .stability import MEASURES
 
 PLAIN_WIDTH = 100
 

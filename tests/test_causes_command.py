@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from onespp.denoise.classes import CAUSES, HISTORIES
+from onespp.denoise.metrics.flicker import STABILITY
 from onespp.denoise.score import score
-from onespp.denoise.stability import STABILITY
 from onespp.render.files.manifest import Manifest, Run
 from onespp.render.files.sequence import Reference, Sequence
 

@@ -24,12 +24,12 @@ import onespp.denoise.ablation
 import onespp.denoise.lead
 import onespp.render.cli.bench
 from onespp.denoise.methods import METHODS, build, parameters
+from onespp.denoise.metrics.flicker import MEASURES
+from onespp.denoise.metrics.tonemap import srgb_from_linear
 from onespp.denoise.outliers import RemoveOutliers
 from onespp.denoise.parameters import pairs
 from onespp.denoise.peers import PEERS
 from onespp.denoise.score import score
-from onespp.denoise.stability import MEASURES
-from onespp.denoise.tonemap import srgb_from_linear
 from onespp.render.errors import InputError
 
 from .report_sequence import make_report_sequence
@@ -51,7 +51,7 @@ UNKNOWN = {"my_scene.py", "tests/test_architecture.py"}  # the reader's, and one
 INSTALLED = hasattr(onespp, "__path__")
 TODAY = {
     "onespp.denoise.run.sequence": "onespp.denoise.stream", "onespp.denoise.score.sequence":
-    "onespp.denoise.score", "onespp.denoise.metrics.table": "onespp.denoise.metrics",
+    "onespp.denoise.score", "onespp.denoise.metrics.table.table": "onespp.denoise.metrics.table",
     "onespp.render.files.sequence import FrameSequence":
     "onespp.render.files.sequence import Sequence as FrameSequence", "onespp.scenes": "scenes"}
 APART = {"lead": onespp.denoise.lead.lead, "ablate": onespp.denoise.ablation.ablation,

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from onespp.denoise.tonemap import bytes_from_linear
+from onespp.denoise.metrics.tonemap import bytes_from_linear
 from onespp.render.tracer.reference import Progress
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog

@@ -11,7 +11,7 @@ import pytest
 MAPS = Path("/proc/self/maps")
 LIGHT = (
     "render", "onespp.render.files.sequence", "onespp.render.files.exr", "onespp.render.games202.convert", "onespp.render.cli.render", "denoise",
-    "onespp.denoise.metrics", "onespp.denoise.flip", "onespp.denoise.stability", "onespp.denoise.classes", "onespp.denoise.judge",
+    "onespp.denoise.metrics.table", "onespp.denoise.metrics.flip", "onespp.denoise.metrics.flicker", "onespp.denoise.classes", "onespp.denoise.judge",
     "onespp.denoise.scorecard", "onespp.denoise.cost", "onespp.render.files.times", "onespp.denoise.compare", "onespp.denoise.pictures",
     "onespp.denoise.provenance", "onespp.denoise.score", "onespp.denoise.report", "onespp.denoise.command",
     "onespp.denoise.score_command", "scenes", "onespp")
@@ -44,7 +44,7 @@ def test_methods_do_load_it_and_the_test_would_see_it():
 
 
 @pytest.mark.skipif(not MAPS.exists(), reason="what is loaded can be told on Linux alone")
-@pytest.mark.parametrize(("first", "then"), [("render", "drjit"), ("onespp.denoise.metrics", "mitsuba")])
+@pytest.mark.parametrize(("first", "then"), [("render", "drjit"), ("onespp.denoise.metrics.table", "mitsuba")])
 def test_the_llvm_is_ours_whatever_asks_for_it_first(first, then):
     """A plain `import drjit` finds the system's, which may be one that it would crash with."""
     code = (f"import os; os.environ.pop('DRJIT_LIBLLVM_PATH', None); import {first}; import {then};"

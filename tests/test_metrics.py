@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from onespp.denoise import flip
-from onespp.denoise.metrics import (
+from onespp.denoise.metrics import flip
+from onespp.denoise.metrics.ssim import ssim
+from onespp.denoise.metrics.table import (
     HEADLINE,
     METRICS,
     PSNR_CAP,
@@ -25,8 +26,7 @@ from onespp.denoise.metrics import (
     smape,
     spread,
 )
-from onespp.denoise.ssim import ssim
-from onespp.denoise.tonemap import bytes_from_linear, linear_from_srgb, srgb_from_linear
+from onespp.denoise.metrics.tonemap import bytes_from_linear, linear_from_srgb, srgb_from_linear
 
 
 def images(seed: int = 0, height: int = 7, width: int = 5) -> tuple[np.ndarray, np.ndarray]:

@@ -12,6 +12,7 @@ from matplotlib import colormaps
 from PIL import Image
 
 import onespp.denoise.movie
+from onespp.denoise.metrics.tonemap import bytes_from_linear, srgb_from_linear
 from onespp.denoise.movie import MovieError, write_movie
 from onespp.denoise.panels import ERROR_MAX, GAP, error_picture, panel, scaled_size, shortened, tile
 from onespp.denoise.pictures import (
@@ -25,7 +26,6 @@ from onespp.denoise.pictures import (
 from onespp.denoise.plot import pareto_front, plot_speed_against_error
 from onespp.denoise.score import measure_sequence, score
 from onespp.denoise.scorecard import INPUT
-from onespp.denoise.tonemap import bytes_from_linear, srgb_from_linear
 from onespp.render.errors import InputError
 
 from .made_sequence import COUNT, HEIGHT, WIDTH, make_sequence, truth

@@ -9,11 +9,11 @@ from urllib.parse import parse_qs
 import numpy as np
 import pytest
 
-from onespp.denoise.flip import flip_map
-from onespp.denoise.metrics import pair
+from onespp.denoise.metrics.flip import flip_map
+from onespp.denoise.metrics.table import pair
+from onespp.denoise.metrics.tonemap import bytes_from_linear
 from onespp.denoise.report import write_report
 from onespp.denoise.score import score
-from onespp.denoise.tonemap import bytes_from_linear
 
 from .report_sequence import COUNT, HEIGHT, METHODS, WIDTH, make_report_sequence
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from onespp.denoise.metrics import METRICS, measure, reference_floor
+from onespp.denoise.metrics.table import METRICS, measure, reference_floor
 from onespp.denoise.score import score
 from onespp.denoise.scorecard import INPUT, read_scores
 from onespp.denoise.table import caption, print_scores

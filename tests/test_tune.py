@@ -7,7 +7,7 @@ import json
 import pytest
 
 from onespp.denoise.methods import build
-from onespp.denoise.tonemap import srgb_from_linear
+from onespp.denoise.metrics.tonemap import srgb_from_linear
 from onespp.denoise.tune import Case, Search, mean_psnr, neighbours, starting_point
 from onespp.render.channels import FRAME
 from onespp.render.files.manifest import Manifest

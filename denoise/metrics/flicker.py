@@ -11,8 +11,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from .correspondence import NOWHERE, carry
-from .metrics import METRICS, Metric, decibels, mse
+from onespp.denoise.correspondence import NOWHERE, carry
+
+from .table import METRICS, Metric, decibels, mse
 
 
 @dataclass(frozen=True)

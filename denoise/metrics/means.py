@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from statistics import fmean
 
-from .metrics import PSNR_CAP, Metric
+from .table import PSNR_CAP, Metric
 
 _DECIBELS = "dB"
 
