@@ -12,10 +12,9 @@ from pathlib import Path
 
 import click
 
+from onespp.denoise.score.scorecard import MethodScore, Scores, read_scores
 from onespp.render.cli.terminal import run
 from onespp.render.errors import InputError
-
-from .scorecard import MethodScore, Scores, read_scores
 
 CAUSES = ("glossy", "disoccluded", "light")
 

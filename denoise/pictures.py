@@ -14,13 +14,13 @@ from PIL import Image
 
 from onespp.denoise.metrics.table import HEADLINE, pair, spread
 from onespp.denoise.metrics.tonemap import bytes_from_linear
+from onespp.denoise.score.scorecard import INPUT, Scores
 from onespp.render.files.atomic import replacing
 from onespp.render.files.sequence import Sequence
 
 from .movie import MovieError, write_movie
 from .panels import GAP, error_legend, error_picture, panel, resize, scaled_size, tile
 from .plot import plot_speed_against_error
-from .scorecard import INPUT, Scores
 
 SHEETS = 3
 WANTED, LARGE_ENOUGH, WIDEST = 480, 640, 3960  # widths in pixels: see `contact_sheet`

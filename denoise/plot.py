@@ -12,9 +12,8 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from onespp.denoise.metrics.table import HEADLINE
+from onespp.denoise.score.scorecard import INPUT, Scores
 from onespp.render.files.atomic import replacing
-
-from .scorecard import INPUT, Scores
 
 FAR = 8.0  # dB; a floor further above the best method would flatten what is to be compared
 _GREY, _INK = "#8a8f98", "#22252b"

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from onespp.denoise.score.scorecard import INPUT, Scores
 from onespp.render.files.manifest import Run
 from onespp.render.files.sequence import Sequence
 from onespp.render.files.times import Times, read_times
 
 from .parameters import present_parameters
-from .scorecard import INPUT, Scores
 from .summary import text_of
 from .table import caption
 

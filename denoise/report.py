@@ -18,6 +18,7 @@ from pathlib import Path
 import jinja2
 import numpy as np
 
+from onespp.denoise.score.scorecard import INPUT, Scores
 from onespp.render.channels import IDS, RADIANCE
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import all_or_none, write_text
@@ -26,7 +27,6 @@ from onespp.render.files.sequence import Sequence
 from . import packed
 from .pictures import Progress, display_errors
 from .provenance import provenance
-from .scorecard import INPUT, Scores
 from .summary import best_cells, highlights, page_data, table_data
 from .table import caption
 

@@ -35,7 +35,8 @@ def score(folder: Path, methods: tuple[str, ...], json_to: str | None, pictures:
 def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = None,
              pictures: bool = True, by_cause: bool = False, seeds: tuple[Path, ...] = ()) -> None:
     """Do what the options of `score` ask."""
-    from .score import score as score_sequence
+    from onespp.denoise.score.sequence import score as score_sequence
+
     from .table import print_classes, print_scores, print_splits
 
     sequence = Sequence.open(folder)
@@ -62,8 +63,9 @@ def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = 
               help="Of the frames, as albedo,normal; default all. Fewer make a smaller folder.")
 def report(folder: Path, channels: str | None) -> None:
     """Write a report of the scored sequence in FOLDER that opens in any browser."""
+    from onespp.denoise.score.scorecard import read_scores
+
     from .report import write_report
-    from .scorecard import read_scores
 
     sequence = Sequence.open(folder)
     if not (folder / "scores.json").exists():
@@ -91,8 +93,8 @@ def compare(a: Path, b: Path, methods: tuple[str, ...], thresholds: tuple[str, .
 
     Change by change, with its standard error over the frames that both have.
     """
-    from .compare import comparison, parse_thresholds, print_comparison
-    from .scorecard import read_scores
+    from onespp.denoise.score.compare import comparison, parse_thresholds, print_comparison
+    from onespp.denoise.score.scorecard import read_scores
 
     found = comparison(read_scores(a), read_scores(b), list(methods) or None,
                        parse_thresholds(thresholds))

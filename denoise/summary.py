@@ -10,13 +10,13 @@ from matplotlib import colormaps
 
 from onespp.denoise.metrics.flicker import MEASURES
 from onespp.denoise.metrics.table import HEADLINE, PSNR_CAP, Metric
+from onespp.denoise.score.causes import CAUSES, HISTORIES
+from onespp.denoise.score.scorecard import INPUT, ClassScore, MethodScore, Scores
 from onespp.render.channels import CHANNELS
 from onespp.render.files.sequence import Sequence
 
-from .classes import CAUSES, HISTORIES
 from .panels import ERROR_MAX
 from .plot import pareto_front, times_are
-from .scorecard import INPUT, ClassScore, MethodScore, Scores
 from .table import cells
 
 _SHOWN_ELSEWHERE = {"method", "ms_per_frame", "machine", *MEASURES}

@@ -9,9 +9,8 @@ from rich.table import Table
 
 from onespp.denoise.metrics.flicker import MEASURES
 from onespp.denoise.metrics.table import HEADLINE, Metric
-
-from .classes import CAUSES, HISTORIES
-from .scorecard import INPUT, MethodScore, Scores
+from onespp.denoise.score.causes import CAUSES, HISTORIES
+from onespp.denoise.score.scorecard import INPUT, MethodScore, Scores
 
 PLAIN_WIDTH = 100
 

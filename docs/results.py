@@ -35,8 +35,8 @@ from onespp.denoise.methods import METHODS, Method, build, parameters
 from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.denoise.peers import PEERS
 from onespp.denoise.plot import plot_speed_against_error
-from onespp.denoise.score import score
-from onespp.denoise.scorecard import INPUT, MethodScore, Scores
+from onespp.denoise.score.scorecard import INPUT, MethodScore, Scores
+from onespp.denoise.score.sequence import score
 from onespp.denoise.stream import denoise_sequence
 from onespp.render.channels import REPLAY
 from onespp.render.cli.arguments import parse_size

@@ -27,11 +27,11 @@ from typing import Any
 
 import numpy as np
 
-from onespp.denoise.compare import comparison
-from onespp.denoise.cost import cost
 from onespp.denoise.report import render_page
-from onespp.denoise.score import measure_sequence
-from onespp.denoise.scorecard import read_scores
+from onespp.denoise.score.compare import comparison
+from onespp.denoise.score.cost import cost
+from onespp.denoise.score.scorecard import read_scores
+from onespp.denoise.score.sequence import measure_sequence
 from onespp.render.errors import InputError
 from onespp.render.files import exr
 from onespp.render.files.sequence import Sequence

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from onespp.denoise.bias import split_errors
 from onespp.denoise.metrics.tonemap import linear_from_srgb
-from onespp.denoise.score import score
-from onespp.denoise.scorecard import INPUT, read_scores
+from onespp.denoise.score.bias_variance import split_errors
+from onespp.denoise.score.scorecard import INPUT, read_scores
+from onespp.denoise.score.sequence import score
 from onespp.denoise.table import print_splits
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest, Run

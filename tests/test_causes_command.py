@@ -9,9 +9,9 @@ import sys
 import numpy as np
 import pytest
 
-from onespp.denoise.classes import CAUSES, HISTORIES
 from onespp.denoise.metrics.flicker import STABILITY
-from onespp.denoise.score import score
+from onespp.denoise.score.causes import CAUSES, HISTORIES
+from onespp.denoise.score.sequence import score
 from onespp.render.files.manifest import Manifest, Run
 from onespp.render.files.sequence import Reference, Sequence
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from onespp.denoise.classes import (
+from onespp.denoise.correspondence import NOWHERE, previous_pixel
+from onespp.denoise.score.causes import (
     CAUSES,
     HISTORIES,
     causes,
@@ -14,7 +15,6 @@ from onespp.denoise.classes import (
     lengthen,
     near_edge,
 )
-from onespp.denoise.correspondence import NOWHERE, previous_pixel
 from onespp.render.files.sequence import Reference
 
 from .synthetic import make_frame, translation, with_images

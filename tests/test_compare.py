@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 import onespp.cli
-from onespp.denoise.compare import comparison, parse_thresholds, standard_error
-from onespp.denoise.scorecard import FrameScore, MethodScore, Scores
+from onespp.denoise.score.compare import comparison, parse_thresholds, standard_error
+from onespp.denoise.score.scorecard import FrameScore, MethodScore, Scores
 from onespp.render.errors import InputError
 
 N = 40

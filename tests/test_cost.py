@@ -9,10 +9,10 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from onespp.denoise.cost import cost, startup
 from onespp.denoise.interleave import time_methods
 from onespp.denoise.memory import PeakMemory
-from onespp.denoise.score import score
+from onespp.denoise.score.cost import cost, startup
+from onespp.denoise.score.sequence import score
 from onespp.denoise.stream import denoise_sequence
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Run

@@ -29,7 +29,7 @@ from onespp.denoise.metrics.tonemap import srgb_from_linear
 from onespp.denoise.outliers import RemoveOutliers
 from onespp.denoise.parameters import pairs
 from onespp.denoise.peers import PEERS
-from onespp.denoise.score import score
+from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
 
 from .report_sequence import make_report_sequence
@@ -50,8 +50,8 @@ UNKNOWN = {"my_scene.py", "tests/test_architecture.py"}  # the reader's, and one
 # The pages are written for the package `onespp`; until its folders are inside, what they are today.
 INSTALLED = hasattr(onespp, "__path__")
 TODAY = {
-    "onespp.denoise.run.sequence": "onespp.denoise.stream", "onespp.denoise.score.sequence":
-    "onespp.denoise.score", "onespp.denoise.metrics.table.table": "onespp.denoise.metrics.table",
+    "onespp.denoise.run.sequence": "onespp.denoise.stream", "onespp.denoise.score.sequence.sequence":
+    "onespp.denoise.score.sequence", "onespp.denoise.metrics.table.table": "onespp.denoise.metrics.table",
     "onespp.render.files.sequence import FrameSequence":
     "onespp.render.files.sequence import Sequence as FrameSequence", "onespp.scenes": "scenes"}
 APART = {"lead": onespp.denoise.lead.lead, "ablate": onespp.denoise.ablation.ablation,

@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from onespp.denoise.lead import CAUSES, lead, markdown
-from onespp.denoise.score import score
+from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
 
 from .report_sequence import make_report_sequence

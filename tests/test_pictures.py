@@ -24,8 +24,8 @@ from onespp.denoise.pictures import (
     movie_pictures,
 )
 from onespp.denoise.plot import pareto_front, plot_speed_against_error
-from onespp.denoise.score import measure_sequence, score
-from onespp.denoise.scorecard import INPUT
+from onespp.denoise.score.scorecard import INPUT
+from onespp.denoise.score.sequence import measure_sequence, score
 from onespp.render.errors import InputError
 
 from .made_sequence import COUNT, HEIGHT, WIDTH, make_sequence, truth

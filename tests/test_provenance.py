@@ -13,8 +13,8 @@ import pytest
 
 from onespp.denoise.provenance import commands, provenance
 from onespp.denoise.report import write_report
-from onespp.denoise.score import score
-from onespp.denoise.scorecard import read_scores
+from onespp.denoise.score.scorecard import read_scores
+from onespp.denoise.score.sequence import score
 from onespp.render.files.json_file import format_json
 from onespp.render.files.sequence import Sequence
 from onespp.render.files.times import MethodTime, Times, read_times

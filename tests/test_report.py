@@ -15,7 +15,7 @@ import onespp.cli
 from onespp.denoise.packed import GUIDE, RADIANCE, WHOLE, pack
 from onespp.denoise.pictures import display_error
 from onespp.denoise.report import EDGES, render_page, write_report
-from onespp.denoise.score import score
+from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence
 

@@ -13,7 +13,7 @@ from onespp.denoise.external import denoise_externally
 from onespp.denoise.methods import METHODS, build, changed, name_of
 from onespp.denoise.peers import PEERS
 from onespp.denoise.provenance import provenance
-from onespp.denoise.score import score
+from onespp.denoise.score.sequence import score
 from onespp.denoise.stream import denoise_sequence
 from onespp.denoise.summary import table_data
 from onespp.denoise.table import print_scores

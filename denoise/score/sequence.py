@@ -25,19 +25,19 @@ from onespp.denoise.metrics.table import (
     spread,
 )
 from onespp.denoise.metrics.tonemap import TONE_MAP
+from onespp.denoise.pictures import Progress, draw_pictures
+from onespp.denoise.provenance import commands
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
 from onespp.render.files.manifest import format_frames
 from onespp.render.files.sequence import Reference, Sequence
 from onespp.render.files.times import read_times
 
-from .bias import split_errors
+from .bias_variance import split_errors
 from .cost import cost
-from .ground import read_ground
-from .judge import Judge
-from .pictures import Progress, draw_pictures
-from .provenance import commands
+from .frame_truth import read_ground
 from .scorecard import INPUT, MethodScore, Scores
+from .scorer import Judge
 
 MOST_LOST = 0.01
 """Share of a reference's pixels that may be non-finite; they count as no error in every image."""

@@ -9,8 +9,8 @@ import numpy as np
 from onespp.denoise.metrics.flicker import MEASURES, STABILITY, Step
 from onespp.denoise.metrics.table import Pair, decibels, measure_pair, non_finite, pair
 
-from .classes import BACKGROUND, CAUSES, HISTORIES, history_class
-from .ground import Ground
+from .causes import BACKGROUND, CAUSES, HISTORIES, history_class
+from .frame_truth import Ground
 from .scorecard import ClassScore, FrameScore
 
 

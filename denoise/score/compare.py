@@ -28,12 +28,12 @@ from rich.table import Table
 from onespp.denoise.metrics.flicker import MEASURES
 from onespp.denoise.metrics.means import identical
 from onespp.denoise.metrics.table import Metric
+from onespp.denoise.parameters import present_parameters
+from onespp.denoise.table import PLAIN_WIDTH
 from onespp.render.errors import InputError
 from onespp.render.files.json_file import JsonFile, format_json
 
-from .parameters import present_parameters
 from .scorecard import MethodScore, Scores
-from .table import PLAIN_WIDTH
 
 TIME = Metric("ms", "time", lambda a, b: None, "", "ms", False, ".1f", "milliseconds a frame")
 ROWS: Mapping[str, Metric] = {**MEASURES, TIME.name: TIME}

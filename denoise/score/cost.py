@@ -5,11 +5,10 @@ from __future__ import annotations
 from statistics import median
 from typing import Any
 
+from onespp.denoise.parameters import present_parameters
 from onespp.render.files.manifest import Run
 from onespp.render.files.sequence import Sequence
 from onespp.render.files.times import Times
-
-from .parameters import present_parameters
 
 STARTING = 3  # frames in which kernels compile: a history's are first needed in the second
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onespp.denoise.correspondence import GUIDES, NOWHERE, previous_pixel
 from onespp.render.files.sequence import Reference, Sequence
 from onespp.render.frame import Frame
 
-from .classes import causes, changed_light, lengthen, moving
-from .correspondence import GUIDES, NOWHERE, previous_pixel
+from .causes import causes, changed_light, lengthen, moving
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""Scores of a sequence: every method against the reference, frame by frame."""
