@@ -23,6 +23,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.run.timed import timed
 from onespp.render.frame import Frame
 from onespp.render.host import backend
 
@@ -31,7 +32,6 @@ from .methods import build
 from .oidn import AVAILABLE, Oidn
 from .probe import probe
 from .surface import read_color, read_surface
-from .timing import timed
 
 WARM_UP, FRAMES = 3, 4
 CROP = (40, 56)  # height, width of the frames for the error

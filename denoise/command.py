@@ -64,8 +64,9 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
                name: str | None = None, outliers: float | None = None,
                default: bool = False) -> None:
     """Do what the options of `denoise` ask; `default`: nobody chose the methods."""
+    from onespp.denoise.run.sequence import denoise_sequence
+
     from .methods import OUTLIERS, build
-    from .stream import denoise_sequence
 
     sequence = Sequence.open(folder)
     chosen = _names(methods)
@@ -123,7 +124,7 @@ def _gaps(sequence: Sequence) -> list[tuple[int, int]]:
 
 
 def _denoise_externally(folder: Path, command: str, name: str) -> None:
-    from .external import denoise_externally
+    from onespp.denoise.run.external import denoise_externally
 
     sequence = Sequence.open(folder)
     with writing(folder, f"denoise-{name}"):
@@ -146,7 +147,8 @@ def time_(folder: Path, methods: tuple[str, ...], frames: int, rounds: int, devi
           threads: int | None) -> None:
     """Time methods in turns on the sequence in FOLDER; `score` then uses these times."""
     use(device, threads)
-    from .interleave import time_methods
+    from onespp.denoise.run.interleaved_timing import time_methods
+
     from .methods import build
 
     sequence = Sequence.open(folder)

@@ -29,15 +29,15 @@ import onespp  # noqa: F401 - finds LLVM before anything imports Dr.Jit
 from onespp.denoise import hard as hard_study
 from onespp.denoise.ablation import ablate, variants
 from onespp.denoise.ablation import markdown as ablation_table
-from onespp.denoise.interleave import time_methods
 from onespp.denoise.lead import markdown as lead_table
 from onespp.denoise.methods import METHODS, Method, build, parameters
 from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.denoise.peers import PEERS
 from onespp.denoise.plot import plot_speed_against_error
+from onespp.denoise.run.interleaved_timing import time_methods
+from onespp.denoise.run.sequence import denoise_sequence
 from onespp.denoise.score.scorecard import INPUT, MethodScore, Scores
 from onespp.denoise.score.sequence import score
-from onespp.denoise.stream import denoise_sequence
 from onespp.render.channels import REPLAY
 from onespp.render.cli.arguments import parse_size
 from onespp.render.cli.render import use

@@ -128,5 +128,5 @@ def test_odd_sizes_are_refused(text):
 
 
 def test_denoise_imports_no_renderer():
-    code = "import sys, onespp.denoise.stream, onespp.denoise.score.sequence; sys.exit('mitsuba' in sys.modules)"
+    code = "import sys, onespp.denoise.run.sequence, onespp.denoise.score.sequence; sys.exit('mitsuba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

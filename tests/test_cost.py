@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from onespp.denoise.interleave import time_methods
-from onespp.denoise.memory import PeakMemory
+from onespp.denoise.run.interleaved_timing import time_methods
+from onespp.denoise.run.peak_memory import PeakMemory
+from onespp.denoise.run.sequence import denoise_sequence
 from onespp.denoise.score.cost import cost, startup
 from onespp.denoise.score.sequence import score
-from onespp.denoise.stream import denoise_sequence
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Run
 from onespp.render.files.times import read_times

@@ -50,7 +50,7 @@ UNKNOWN = {"my_scene.py", "tests/test_architecture.py"}  # the reader's, and one
 # The pages are written for the package `onespp`; until its folders are inside, what they are today.
 INSTALLED = hasattr(onespp, "__path__")
 TODAY = {
-    "onespp.denoise.run.sequence": "onespp.denoise.stream", "onespp.denoise.score.sequence.sequence":
+    "onespp.denoise.run.sequence": "onespp.denoise.run.sequence", "onespp.denoise.score.sequence.sequence":
     "onespp.denoise.score.sequence", "onespp.denoise.metrics.table.table": "onespp.denoise.metrics.table",
     "onespp.render.files.sequence import FrameSequence":
     "onespp.render.files.sequence import Sequence as FrameSequence", "onespp.scenes": "scenes"}

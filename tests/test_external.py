@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from onespp.denoise.external import denoise_externally
+from onespp.denoise.run.external import denoise_externally
 from onespp.render.errors import InputError
 
 from .small_sequence import HEIGHT, WIDTH, small_sequence

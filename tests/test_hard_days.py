@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from onespp.denoise.report import write_report
+from onespp.denoise.run.sequence import _remove_stale
 from onespp.denoise.score.sequence import measure_sequence
-from onespp.denoise.stream import _remove_stale
 from onespp.render import job
 from onespp.render.errors import InputError
 from onespp.render.files import atomic, lock

@@ -17,7 +17,7 @@ from onespp.denoise.parameters import (
     renamed_parameters,
     with_present_names,
 )
-from onespp.denoise.stream import denoise_sequence
+from onespp.denoise.run.sequence import denoise_sequence
 from onespp.denoise.svgf import Svgf
 from onespp.denoise.tune import Search, starting_point
 from onespp.render.errors import InputError

@@ -13,10 +13,10 @@ from onespp.denoise.atrous import Atrous
 from onespp.denoise.bilateral import Bilateral
 from onespp.denoise.exponential import exp2
 from onespp.denoise.reprojection import load_table
+from onespp.denoise.run.timed import timed
 from onespp.denoise.stencil import Stencil, Step, Taps
 from onespp.denoise.structure import build, evaluate, flatten
 from onespp.denoise.temporal import Temporal
-from onespp.denoise.timing import timed
 from onespp.render.errors import InputError
 
 from .kernels import compiled

@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from onespp.denoise.stream import ALONE, Pace, denoise_sequence
+from onespp.denoise.run.sequence import ALONE, Pace, denoise_sequence
 from onespp.denoise.temporal import Temporal
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest

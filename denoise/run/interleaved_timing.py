@@ -13,6 +13,7 @@ from functools import partial
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.methods import Method, channels_read, parameters
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
 from onespp.render.files.json_file import format_json
@@ -21,8 +22,7 @@ from onespp.render.files.times import MethodTime, Times
 from onespp.render.host import backend
 from onespp.render.host.machine import machine
 
-from .methods import Method, channels_read, parameters
-from .timing import timed
+from .timed import timed
 
 
 def time_methods(sequence: Sequence, methods: Mapping[str, Method], frames: int = 4,

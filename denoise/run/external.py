@@ -14,14 +14,13 @@ import tempfile
 import time
 from pathlib import Path
 
+from onespp.denoise.methods import check_not_a_method
 from onespp.render.cli.terminal import readable
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Run, check_result_name
 from onespp.render.files.sequence import Sequence
 from onespp.render.games202.convert import export_games202, import_result
 from onespp.render.host.machine import machine
-
-from .methods import check_not_a_method
 
 _LAST_LINES, _MOST_LETTERS = 3, 300
 PLACES: tuple[str, ...] = ("{input}", "{output}", "{frames}")

@@ -18,6 +18,16 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.methods import (
+    Method,
+    changed,
+    channels_read,
+    check_not_a_method,
+    name_of,
+    parameters,
+)
+from onespp.denoise.outliers import energy_kept
+from onespp.denoise.parameters import present_parameters
 from onespp.render.files.manifest import Run, check_result_name
 from onespp.render.files.sequence import Sequence
 from onespp.render.frame import Frame
@@ -25,11 +35,8 @@ from onespp.render.host import backend
 from onespp.render.host.machine import machine
 from onespp.render.host.versions import versions
 
-from .memory import PeakMemory
-from .methods import Method, changed, channels_read, check_not_a_method, name_of, parameters
-from .outliers import energy_kept
-from .parameters import present_parameters
-from .timing import timed
+from .peak_memory import PeakMemory
+from .timed import timed
 
 ALONE = 8  # frames that nothing else runs beside
 

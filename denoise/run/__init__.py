@@ -1,0 +1,1 @@
+"""Methods run over sequences, and timed."""
