@@ -25,9 +25,10 @@ def bench(size: str, repeats: int, scaling: bool, json_to: str | None, device: s
     """Measure the denoising kernels on this machine, against Open Image Denoise and its limits."""
     height, width = parse_size(size)
     use(device, threads)
-    from .bench import SIZES
-    from .bench import bench as measure
-    from .bench import scaling as measure_sizes
+    from onespp.denoise.bench.kernels import SIZES
+    from onespp.denoise.bench.kernels import bench as measure
+    from onespp.denoise.bench.kernels import scaling as measure_sizes
+
     from .bench_table import print_bench, print_scaling
 
     if scaling:

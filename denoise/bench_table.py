@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table
 
-from .bench import Bench, Scaling
+from onespp.denoise.bench.kernels import Bench, Scaling
 
 PLAIN_WIDTH = 100
 SPEED = ("kernel", "ms", "/OIDN", "call ms", "/OIDN", "first ms", "over 1 thread")

@@ -8,8 +8,7 @@ from typing import Any
 import drjit as dr
 
 from onespp.denoise.run.timed import timed
-
-from .stencil import Stencil
+from onespp.denoise.stencil import Stencil
 
 _REPEATS = 5
 _CHAINS, _STEPS = 12, 64  # independent FMAs in flight, and how often each runs

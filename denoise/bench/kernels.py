@@ -23,15 +23,16 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
+from onespp.denoise import oracles
+from onespp.denoise.methods import build
+from onespp.denoise.oidn import AVAILABLE, Oidn
 from onespp.denoise.run.timed import timed
+from onespp.denoise.surface import read_color, read_surface
 from onespp.render.frame import Frame
 from onespp.render.host import backend
 
-from . import limits, oracles
-from .methods import build
-from .oidn import AVAILABLE, Oidn
-from .probe import probe
-from .surface import read_color, read_surface
+from . import machine_limits as limits
+from .probe_frames import probe
 
 WARM_UP, FRAMES = 3, 4
 CROP = (40, 56)  # height, width of the frames for the error
