@@ -34,8 +34,9 @@ def tune(folders: tuple[Path, ...], method: str, names: tuple[str, ...],
     Give other frames and seeds than those that you report scores of.
     """
     use(device, threads)
+    from onespp.denoise.studies.tune import FACTORS, Search, read_case, starting_point
+
     from .methods import build
-    from .tune import FACTORS, Search, read_case, starting_point
 
     start = starting_point(method, pairs(settings), note)
     renamed = renamed_parameters(build(method))

@@ -26,10 +26,6 @@ import click
 import numpy as np
 
 import onespp  # noqa: F401 - finds LLVM before anything imports Dr.Jit
-from onespp.denoise import hard as hard_study
-from onespp.denoise.ablation import ablate, variants
-from onespp.denoise.ablation import markdown as ablation_table
-from onespp.denoise.lead import markdown as lead_table
 from onespp.denoise.methods import METHODS, Method, build, parameters
 from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.denoise.peers import PEERS
@@ -38,6 +34,10 @@ from onespp.denoise.run.interleaved_timing import time_methods
 from onespp.denoise.run.sequence import denoise_sequence
 from onespp.denoise.score.scorecard import INPUT, MethodScore, Scores
 from onespp.denoise.score.sequence import score
+from onespp.denoise.studies import hard_scenes as hard_study
+from onespp.denoise.studies.ablation import ablate, variants
+from onespp.denoise.studies.ablation import markdown as ablation_table
+from onespp.denoise.studies.lead import markdown as lead_table
 from onespp.render.channels import REPLAY
 from onespp.render.cli.arguments import parse_size
 from onespp.render.cli.render import use

@@ -63,7 +63,7 @@ def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
     recovers from a sudden change, and whether it keeps the energy.
     """
     onespp.render.cli.render.use(device, threads)
-    from onespp.denoise.hard import markdown
+    from onespp.denoise.studies.hard_scenes import markdown
     from onespp.scenes.hard import HARD
 
     from .scenes import catalog
@@ -81,8 +81,8 @@ def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
 
 def _judge_hard(name: str, out: Path, reference_spp: int, advance: Callable[[float], None]) -> list:
     """Rows of one hard scene; `advance` is told the share that is done."""
-    from onespp.denoise.hard import judge
     from onespp.denoise.methods import METHODS
+    from onespp.denoise.studies.hard_scenes import judge
     from onespp.render.job import RenderJob, kept_references, render_sequence
     from onespp.scenes.hard import HARD
 

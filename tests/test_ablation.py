@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from onespp.denoise.ablation import ablate, ablation, markdown, variants
 from onespp.denoise.methods import parameters
+from onespp.denoise.studies.ablation import ablate, ablation, markdown, variants
 from onespp.render.cli.terminal import run
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest

@@ -20,8 +20,8 @@ import results
 from sphinx.cmd.build import build_main
 
 import onespp.cli
-import onespp.denoise.ablation
-import onespp.denoise.lead
+import onespp.denoise.studies.ablation
+import onespp.denoise.studies.lead
 import onespp.render.cli.bench
 from onespp.denoise.methods import METHODS, build, parameters
 from onespp.denoise.metrics.flicker import MEASURES
@@ -54,7 +54,7 @@ TODAY = {
     "onespp.denoise.score.sequence", "onespp.denoise.metrics.table.table": "onespp.denoise.metrics.table",
     "onespp.render.files.sequence import FrameSequence":
     "onespp.render.files.sequence import Sequence as FrameSequence", "onespp.scenes": "scenes"}
-APART = {"lead": onespp.denoise.lead.lead, "ablate": onespp.denoise.ablation.ablation,
+APART = {"lead": onespp.denoise.studies.lead.lead, "ablate": onespp.denoise.studies.ablation.ablation,
          "bench render": onespp.render.cli.bench.bench}
 
 

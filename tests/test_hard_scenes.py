@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from onespp.denoise.correspondence import previous_pixel
-from onespp.denoise.hard import INPUT, Row, judge, markdown, misses, run_alone
 from onespp.denoise.methods import METHODS, build, parameters
+from onespp.denoise.studies.hard_scenes import INPUT, Row, judge, markdown, misses, run_alone
 from onespp.render.channels import REPLAY
 from onespp.render.job import RenderJob, render_sequence
 from onespp.render.tracer.camera_rays import camera_matrices

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from click.testing import CliRunner
 
-from onespp.denoise.lead import CAUSES, lead, markdown
 from onespp.denoise.score.sequence import score
+from onespp.denoise.studies.lead import CAUSES, lead, markdown
 from onespp.render.errors import InputError
 
 from .report_sequence import make_report_sequence

@@ -18,8 +18,8 @@ from onespp.denoise.parameters import (
     with_present_names,
 )
 from onespp.denoise.run.sequence import denoise_sequence
+from onespp.denoise.studies.tune import Search, starting_point
 from onespp.denoise.svgf import Svgf
-from onespp.denoise.tune import Search, starting_point
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest
 from onespp.render.files.sequence import Sequence
@@ -127,7 +127,7 @@ def test_scores_of_two_versions_have_the_same_parameters():
 def test_a_search_of_the_last_version_is_gone_on_with(tmp_path, monkeypatch):
     file = tmp_path / "tried.json"
     file.write_text(json.dumps({json.dumps(former(Svgf()), sort_keys=True): 31.5}))
-    monkeypatch.setattr("onespp.denoise.tune.mean_psnr", lambda *_: pytest.fail("measured twice"))
+    monkeypatch.setattr("onespp.denoise.studies.tune.mean_psnr", lambda *_: pytest.fail("measured twice"))
     search = Search("svgf", starting_point("svgf", {}), [], file)
     assert search.value(starting_point("svgf", {})) == 31.5
 

@@ -8,7 +8,7 @@ import pytest
 
 from onespp.denoise.methods import build
 from onespp.denoise.metrics.tonemap import srgb_from_linear
-from onespp.denoise.tune import Case, Search, mean_psnr, neighbours, starting_point
+from onespp.denoise.studies.tune import Case, Search, mean_psnr, neighbours, starting_point
 from onespp.render.channels import FRAME
 from onespp.render.files.manifest import Manifest
 from onespp.render.files.sequence import Reference, Sequence
@@ -42,7 +42,7 @@ def test_it_goes_on_from_what_it_had_tried(case, tmp_path, monkeypatch):
     first = Search("temporal", start, [case], file)
     result = first.run(["alpha"], factors=(2.0,))
     again = Search("temporal", start, [case], file)
-    monkeypatch.setattr("onespp.denoise.tune.mean_psnr", lambda *_: pytest.fail("measured twice"))
+    monkeypatch.setattr("onespp.denoise.studies.tune.mean_psnr", lambda *_: pytest.fail("measured twice"))
     assert again.run(["alpha"], factors=(2.0,)) == result
     assert len(json.loads(file.read_text())) == len(first.tried) > 2
 

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onespp.denoise.methods import METHODS, Method
 from onespp.denoise.metrics.table import measure_pair, non_finite, pair, reference_floor
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence as Folder
 from onespp.render.frame import Frame
-
-from .methods import METHODS, Method
 
 MARGIN = 0.3          # dB
 ENERGY_MARGIN = 0.02  # of the reference's mean

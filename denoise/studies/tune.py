@@ -17,16 +17,15 @@ from typing import Any
 
 import numpy as np
 
+from onespp.denoise.methods import Method, build, channels_read, parameters
 from onespp.denoise.metrics.means import mean_decibels
 from onespp.denoise.metrics.table import psnr
 from onespp.denoise.metrics.tonemap import srgb_from_linear
+from onespp.denoise.parameters import present_parameters
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
 from onespp.render.files.sequence import Sequence
 from onespp.render.frame import Frame
-
-from .methods import Method, build, channels_read, parameters
-from .parameters import present_parameters
 
 FACTORS = (2.0, 1.4, 1.15)
 LEAST_GAIN = 0.003  # dB; less is not worth another number

@@ -1,4 +1,4 @@
-"""`python -m onespp.denoise.lead PLAIN OURS ...`: how far a method is ahead of a peer, as Markdown.
+"""`python -m onespp.denoise.studies.lead PLAIN OURS ...`: how far a method is ahead of a peer, as Markdown.
 
 For each scene two scored folders: frames of the plain estimator, which any renderer gives, and of
 ours; the peer gets both inputs, the method the second. Everything is read from their scores.json.
@@ -118,4 +118,4 @@ def lead(folders: tuple[Path, ...], method: str, peer: str) -> None:
 
 
 if __name__ == "__main__":
-    run(lead, name="python -m onespp.denoise.lead")
+    run(lead, name="python -m onespp.denoise.studies.lead")

@@ -1,4 +1,4 @@
-"""`python -m onespp.denoise.ablation DIR...`: what each part of a method is worth, as a Markdown table.
+"""`python -m onespp.denoise.studies.ablation DIR...`: what each part of a method is worth, as a Markdown table.
 
 A part is a parameter that is true or false; each row turns one of them to what it is not by
 default. Nothing is written: frames are denoised in memory, all variants side by side.
@@ -14,6 +14,7 @@ from typing import Any
 
 import click
 
+from onespp.denoise.methods import Method, build, channels_read, parameters
 from onespp.denoise.metrics.flicker import MEASURES
 from onespp.denoise.metrics.means import mean_over_frames
 from onespp.denoise.metrics.tonemap import TONE_MAP
@@ -23,8 +24,6 @@ from onespp.render.cli.render import device_option, threads_option, use
 from onespp.render.cli.terminal import progress, run
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence
-
-from .methods import Method, build, channels_read, parameters
 
 COLUMNS = ("psnr_srgb", "flip", "flicker")
 WHOLE = "as it is"
@@ -126,4 +125,4 @@ def ablation(folders: tuple[Path, ...], method: str, device: str, threads: int |
 
 
 if __name__ == "__main__":
-    run(ablation, name="python -m onespp.denoise.ablation")
+    run(ablation, name="python -m onespp.denoise.studies.ablation")

@@ -1,0 +1,1 @@
+"""Experiments: what parts are worth, how far a method leads, hard scenes, tuning."""
