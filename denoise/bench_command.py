@@ -28,8 +28,7 @@ def bench(size: str, repeats: int, scaling: bool, json_to: str | None, device: s
     from onespp.denoise.bench.kernels import SIZES
     from onespp.denoise.bench.kernels import bench as measure
     from onespp.denoise.bench.kernels import scaling as measure_sizes
-
-    from .bench_table import print_bench, print_scaling
+    from onespp.denoise.report.bench_table import print_bench, print_scaling
 
     if scaling:
         with progress() as begin:

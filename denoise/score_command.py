@@ -35,9 +35,8 @@ def score(folder: Path, methods: tuple[str, ...], json_to: str | None, pictures:
 def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = None,
              pictures: bool = True, by_cause: bool = False, seeds: tuple[Path, ...] = ()) -> None:
     """Do what the options of `score` ask."""
+    from onespp.denoise.report.terminal import print_classes, print_scores, print_splits
     from onespp.denoise.score.sequence import score as score_sequence
-
-    from .table import print_classes, print_scores, print_splits
 
     sequence = Sequence.open(folder)
     others = [Sequence.open(other) for other in seeds]
@@ -63,9 +62,8 @@ def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = 
               help="Of the frames, as albedo,normal; default all. Fewer make a smaller folder.")
 def report(folder: Path, channels: str | None) -> None:
     """Write a report of the scored sequence in FOLDER that opens in any browser."""
+    from onespp.denoise.report.html import write_report
     from onespp.denoise.score.scorecard import read_scores
-
-    from .report import write_report
 
     sequence = Sequence.open(folder)
     if not (folder / "scores.json").exists():

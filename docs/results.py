@@ -29,7 +29,7 @@ import onespp  # noqa: F401 - finds LLVM before anything imports Dr.Jit
 from onespp.denoise.methods import METHODS, Method, build, parameters
 from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.denoise.peers import PEERS
-from onespp.denoise.plot import plot_speed_against_error
+from onespp.denoise.report.speed_error_plot import plot_speed_against_error
 from onespp.denoise.run.interleaved_timing import time_methods
 from onespp.denoise.run.sequence import denoise_sequence
 from onespp.denoise.score.scorecard import INPUT, MethodScore, Scores

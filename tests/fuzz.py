@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from onespp.denoise.report import render_page
+from onespp.denoise.report.html import render_page
 from onespp.denoise.score.compare import comparison
 from onespp.denoise.score.cost import cost
 from onespp.denoise.score.scorecard import read_scores

@@ -12,8 +12,8 @@ from rich.console import Console
 import onespp.cli
 from onespp.denoise.bench.kernels import KERNELS, Scaling, max_error, measure_one_thread, scaling
 from onespp.denoise.bench.probe_frames import probe
-from onespp.denoise.bench_table import print_scaling
 from onespp.denoise.methods import METHODS
+from onespp.denoise.report.bench_table import print_scaling
 
 
 def test_the_command_prints_the_figures_of_every_kernel_as_json():

@@ -10,10 +10,10 @@ import pytest
 from rich.console import Console
 
 from onespp.denoise.metrics.tonemap import linear_from_srgb
+from onespp.denoise.report.terminal import print_splits
 from onespp.denoise.score.bias_variance import split_errors
 from onespp.denoise.score.scorecard import INPUT, read_scores
 from onespp.denoise.score.sequence import score
-from onespp.denoise.table import print_splits
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest, Run
 from onespp.render.files.sequence import Reference, Sequence

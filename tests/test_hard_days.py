@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from onespp.denoise.report import write_report
+from onespp.denoise.report.html import write_report
 from onespp.denoise.run.sequence import _remove_stale
 from onespp.denoise.score.sequence import measure_sequence
 from onespp.render import job

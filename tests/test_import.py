@@ -10,9 +10,9 @@ import pytest
 
 from onespp.denoise.methods import build
 from onespp.denoise.peers import PEERS
-from onespp.denoise.report import write_report
+from onespp.denoise.report.html import write_report
+from onespp.denoise.report.terminal import caption
 from onespp.denoise.score.sequence import score
-from onespp.denoise.table import caption
 from onespp.render.errors import InputError
 from onespp.render.files.exr import write_exr
 from onespp.render.files.manifest import Manifest

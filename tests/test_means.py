@@ -13,11 +13,11 @@ from onespp.denoise.metrics.flicker import MEASURES
 from onespp.denoise.metrics.means import mean_decibels, mean_over_frames
 from onespp.denoise.metrics.table import METRICS, PSNR_CAP, psnr
 from onespp.denoise.metrics.tonemap import srgb_from_linear
-from onespp.denoise.pictures import display_error
+from onespp.denoise.report.contact_sheets import display_error
+from onespp.denoise.report.terminal import cells, print_scores
 from onespp.denoise.score.compare import comparison
 from onespp.denoise.score.scorecard import INPUT, read_scores
 from onespp.denoise.score.sequence import score
-from onespp.denoise.table import cells, print_scores
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Run
 from onespp.render.files.sequence import Reference, Sequence

@@ -11,11 +11,9 @@ import pytest
 from matplotlib import colormaps
 from PIL import Image
 
-import onespp.denoise.movie
+import onespp.denoise.report.movie
 from onespp.denoise.metrics.tonemap import bytes_from_linear, srgb_from_linear
-from onespp.denoise.movie import MovieError, write_movie
-from onespp.denoise.panels import ERROR_MAX, GAP, error_picture, panel, scaled_size, shortened, tile
-from onespp.denoise.pictures import (
+from onespp.denoise.report.contact_sheets import (
     LARGE_ENOUGH,
     WANTED,
     _columns,
@@ -23,7 +21,17 @@ from onespp.denoise.pictures import (
     display_error,
     movie_pictures,
 )
-from onespp.denoise.plot import pareto_front, plot_speed_against_error
+from onespp.denoise.report.movie import MovieError, write_movie
+from onespp.denoise.report.panels import (
+    ERROR_MAX,
+    GAP,
+    error_picture,
+    panel,
+    scaled_size,
+    shortened,
+    tile,
+)
+from onespp.denoise.report.speed_error_plot import pareto_front, plot_speed_against_error
 from onespp.denoise.score.scorecard import INPUT
 from onespp.denoise.score.sequence import measure_sequence, score
 from onespp.render.errors import InputError
@@ -204,7 +212,7 @@ def test_without_ffmpeg_there_is_one_sentence_and_all_else(tmp_path, monkeypatch
     def none():
         raise RuntimeError("No ffmpeg exe could be found")
 
-    monkeypatch.setattr(onespp.denoise.movie.imageio_ffmpeg, "get_ffmpeg_exe", none)
+    monkeypatch.setattr(onespp.denoise.report.movie.imageio_ffmpeg, "get_ffmpeg_exe", none)
     sequence = make_sequence(tmp_path / "made")
     scores = score(sequence)
     assert [note for note in scores.notes if "no movie" in note and "\n" not in note]
@@ -219,7 +227,7 @@ def test_an_ffmpeg_that_fails_is_named_with_its_reason(tmp_path, monkeypatch, sc
     program = tmp_path / "ffmpeg"
     program.write_text(script)
     program.chmod(0o755)
-    monkeypatch.setattr(onespp.denoise.movie.imageio_ffmpeg, "get_ffmpeg_exe", lambda: str(program))
+    monkeypatch.setattr(onespp.denoise.report.movie.imageio_ffmpeg, "get_ffmpeg_exe", lambda: str(program))
     big = np.zeros((512, 512, 3), np.uint8)
     with pytest.raises(MovieError, match="broken"):
         write_movie(tmp_path / "out/a.mp4", [big, big], 24)

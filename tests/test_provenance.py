@@ -11,8 +11,8 @@ from html import unescape
 
 import pytest
 
-from onespp.denoise.provenance import commands, provenance
-from onespp.denoise.report import write_report
+from onespp.denoise.report.html import write_report
+from onespp.denoise.report.provenance import commands, provenance
 from onespp.denoise.score.scorecard import read_scores
 from onespp.denoise.score.sequence import score
 from onespp.render.files.json_file import format_json

@@ -12,9 +12,9 @@ import pytest
 from click.testing import CliRunner
 
 import onespp.cli
-from onespp.denoise.packed import GUIDE, RADIANCE, WHOLE, pack
-from onespp.denoise.pictures import display_error
-from onespp.denoise.report import EDGES, render_page, write_report
+from onespp.denoise.report.contact_sheets import display_error
+from onespp.denoise.report.html import EDGES, render_page, write_report
+from onespp.denoise.report.page_images import GUIDE, RADIANCE, WHOLE, pack
 from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence

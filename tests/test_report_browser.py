@@ -12,7 +12,7 @@ import pytest
 from onespp.denoise.metrics.flip import flip_map
 from onespp.denoise.metrics.table import pair
 from onespp.denoise.metrics.tonemap import bytes_from_linear
-from onespp.denoise.report import write_report
+from onespp.denoise.report.html import write_report
 from onespp.denoise.score.sequence import score
 
 from .report_sequence import COUNT, HEIGHT, METHODS, WIDTH, make_report_sequence

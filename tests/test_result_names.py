@@ -11,12 +11,12 @@ from onespp.denoise.atrous import Atrous
 from onespp.denoise.command import denoise_in
 from onespp.denoise.methods import METHODS, build, changed, name_of
 from onespp.denoise.peers import PEERS
-from onespp.denoise.provenance import provenance
+from onespp.denoise.report.page_data import table_data
+from onespp.denoise.report.provenance import provenance
+from onespp.denoise.report.terminal import print_scores
 from onespp.denoise.run.external import denoise_externally
 from onespp.denoise.run.sequence import denoise_sequence
 from onespp.denoise.score.sequence import score
-from onespp.denoise.summary import table_data
-from onespp.denoise.table import print_scores
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Run, check_result_name
 from onespp.render.files.sequence import Sequence

@@ -12,9 +12,9 @@ import pytest
 from rich.console import Console
 
 from onespp.denoise.metrics.table import METRICS, measure, reference_floor
+from onespp.denoise.report.terminal import caption, print_scores
 from onespp.denoise.score.scorecard import INPUT, read_scores
 from onespp.denoise.score.sequence import score
-from onespp.denoise.table import caption, print_scores
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Run
 from onespp.render.files.sequence import Sequence

@@ -29,7 +29,7 @@ from onespp.denoise.metrics.flicker import MEASURES
 from onespp.denoise.metrics.means import identical
 from onespp.denoise.metrics.table import Metric
 from onespp.denoise.parameters import present_parameters
-from onespp.denoise.table import PLAIN_WIDTH
+from onespp.denoise.report.terminal import PLAIN_WIDTH
 from onespp.render.errors import InputError
 from onespp.render.files.json_file import JsonFile, format_json
 

@@ -25,8 +25,8 @@ from onespp.denoise.metrics.table import (
     spread,
 )
 from onespp.denoise.metrics.tonemap import TONE_MAP
-from onespp.denoise.pictures import Progress, draw_pictures
-from onespp.denoise.provenance import commands
+from onespp.denoise.report.contact_sheets import Progress, draw_pictures
+from onespp.denoise.report.provenance import commands
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
 from onespp.render.files.manifest import format_frames

@@ -24,11 +24,11 @@ from onespp.render.errors import InputError
 from onespp.render.files.atomic import all_or_none, write_text
 from onespp.render.files.sequence import Sequence
 
-from . import packed
-from .pictures import Progress, display_errors
+from . import page_images as packed
+from .contact_sheets import Progress, display_errors
+from .page_data import best_cells, highlights, page_data, table_data
 from .provenance import provenance
-from .summary import best_cells, highlights, page_data, table_data
-from .table import caption
+from .terminal import caption
 
 EDGES = np.logspace(-4, 0, 49)
 """Edges of the bins of the histogram; errors below the first are in the first bin."""
@@ -133,7 +133,7 @@ def _measure(images: dict[str, np.ndarray], histograms: dict[str, np.ndarray],
 
 def render_page(sequence: Sequence, scores: Scores, data: dict, command: str = "") -> str:
     """The text of index.html."""
-    environment = jinja2.Environment(loader=jinja2.PackageLoader("denoise", "page"),
+    environment = jinja2.Environment(loader=jinja2.PackageLoader("onespp.denoise.report", "page"),
                                      autoescape=True, undefined=jinja2.StrictUndefined,
                                      trim_blocks=True, lstrip_blocks=True)
     source = environment.loader

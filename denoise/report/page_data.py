@@ -16,8 +16,8 @@ from onespp.render.channels import CHANNELS
 from onespp.render.files.sequence import Sequence
 
 from .panels import ERROR_MAX
-from .plot import pareto_front, times_are
-from .table import cells
+from .speed_error_plot import pareto_front, times_are
+from .terminal import cells
 
 _SHOWN_ELSEWHERE = {"method", "ms_per_frame", "machine", *MEASURES}
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from onespp.denoise.parameters import present_parameters
 from onespp.denoise.score.scorecard import INPUT, Scores
 from onespp.render.files.manifest import Run
 from onespp.render.files.sequence import Sequence
 from onespp.render.files.times import Times, read_times
 
-from .parameters import present_parameters
-from .summary import text_of
-from .table import caption
+from .page_data import text_of
+from .terminal import caption
 
 
 def commands(sequence: Sequence, methods: Iterable[str]) -> list[str]:

@@ -20,7 +20,7 @@ from onespp.render.files.sequence import Sequence
 
 from .movie import MovieError, write_movie
 from .panels import GAP, error_legend, error_picture, panel, resize, scaled_size, tile
-from .plot import plot_speed_against_error
+from .speed_error_plot import plot_speed_against_error
 
 SHEETS = 3
 WANTED, LARGE_ENOUGH, WIDEST = 480, 640, 3960  # widths in pixels: see `contact_sheet`
