@@ -12,10 +12,10 @@ import click
 from click.core import ParameterSource
 
 import onespp.render.cli.render
-from onespp.denoise.bench_command import bench
-from onespp.denoise.command import DEFAULT_METHODS, denoise, denoise_in, time_
-from onespp.denoise.score_command import compare, report, score, score_in
-from onespp.denoise.tune_command import tune
+from onespp.denoise.cli.bench import bench
+from onespp.denoise.cli.denoise import DEFAULT_METHODS, denoise, denoise_in, time_
+from onespp.denoise.cli.score import compare, report, score, score_in
+from onespp.denoise.cli.tune import tune
 from onespp.render.cli.terminal import BAD_INPUT, Steps, progress
 from onespp.render.cli.terminal import run as run_command
 

@@ -13,8 +13,8 @@ LIGHT = (
     "render", "onespp.render.files.sequence", "onespp.render.files.exr", "onespp.render.games202.convert", "onespp.render.cli.render", "denoise",
     "onespp.denoise.metrics.table", "onespp.denoise.metrics.flip", "onespp.denoise.metrics.flicker", "onespp.denoise.score.causes", "onespp.denoise.score.scorer",
     "onespp.denoise.score.scorecard", "onespp.denoise.score.cost", "onespp.render.files.times", "onespp.denoise.score.compare", "onespp.denoise.report.contact_sheets",
-    "onespp.denoise.report.provenance", "onespp.denoise.score.sequence", "onespp.denoise.report.html", "onespp.denoise.command",
-    "onespp.denoise.score_command", "scenes", "onespp")
+    "onespp.denoise.report.provenance", "onespp.denoise.score.sequence", "onespp.denoise.report.html", "onespp.denoise.cli.denoise",
+    "onespp.denoise.cli.score", "scenes", "onespp")
 CODE = """
 import importlib, sys
 from pathlib import Path

@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from onespp.denoise.atrous import Atrous
-from onespp.denoise.command import denoise_in
+from onespp.denoise.cli.denoise import denoise_in
 from onespp.denoise.methods import METHODS, build, changed, name_of
 from onespp.denoise.peers import PEERS
 from onespp.denoise.report.page_data import table_data

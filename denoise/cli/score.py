@@ -11,7 +11,7 @@ from onespp.render.cli.terminal import command_line, named_progress
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import Sequence
 
-from .json_option import json_option, show_or_print
+from .options import json_option, show_or_print
 
 
 @click.command()

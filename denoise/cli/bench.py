@@ -8,7 +8,7 @@ from onespp.render.cli.arguments import parse_size
 from onespp.render.cli.render import device_option, threads_option, use
 from onespp.render.cli.terminal import progress
 
-from .json_option import json_option, show_or_print
+from .options import json_option, show_or_print
 
 
 @click.command()

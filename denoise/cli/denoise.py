@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
+from onespp.denoise.parameters import pairs
 from onespp.render.channels import REPLAY, SPLIT
 from onespp.render.cli.render import device_option, threads_option, use
 from onespp.render.cli.terminal import command_line, note, progress
@@ -17,8 +18,6 @@ from onespp.render.errors import InputError
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import Sequence
 from onespp.render.games202.layout import gaps
-
-from .parameters import pairs
 
 DEFAULT_METHODS = ("onespp",)
 BETTER_ON_PLAIN = ("temporal-oidn", "oidn-high")
@@ -64,9 +63,8 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
                name: str | None = None, outliers: float | None = None,
                default: bool = False) -> None:
     """Do what the options of `denoise` ask; `default`: nobody chose the methods."""
+    from onespp.denoise.methods import OUTLIERS, build
     from onespp.denoise.run.sequence import denoise_sequence
-
-    from .methods import OUTLIERS, build
 
     sequence = Sequence.open(folder)
     chosen = _names(methods)
@@ -104,7 +102,7 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
 def _what_to_know(sequence: Sequence, default: bool) -> Iterator[str]:
     """What a user may not know of these frames, a sentence each; `default`: of the method, too."""
     if default and not set(SPLIT) <= set(sequence.manifest.channels):
-        from .peers import PEERS
+        from onespp.denoise.peers import PEERS
 
         install = "" if all(PEERS[name].available() for name in BETTER_ON_PLAIN) else (
             ", with Open Image Denoise installed (pip install 'onespp[oidn]')")
@@ -147,9 +145,8 @@ def time_(folder: Path, methods: tuple[str, ...], frames: int, rounds: int, devi
           threads: int | None) -> None:
     """Time methods in turns on the sequence in FOLDER; `score` then uses these times."""
     use(device, threads)
+    from onespp.denoise.methods import build
     from onespp.denoise.run.interleaved_timing import time_methods
-
-    from .methods import build
 
     sequence = Sequence.open(folder)
     chosen = {name: build(name) for name in _names(methods)}
@@ -165,9 +162,9 @@ def time_(folder: Path, methods: tuple[str, ...], frames: int, rounds: int, devi
 
 def _names(methods: tuple[str, ...]) -> list[str]:
     """The methods meant, `all` and `oidn` replaced by what they stand for."""
-    from .methods import METHODS
-    from .oidn import QUALITIES
-    from .peers import PEERS
+    from onespp.denoise.methods import METHODS
+    from onespp.denoise.oidn import QUALITIES
+    from onespp.denoise.peers import PEERS
 
     groups = {"all": [*METHODS, *(name for name, peer in PEERS.items() if peer.available())],
               "oidn": [f"oidn-{quality}" for quality in QUALITIES]}
@@ -175,8 +172,8 @@ def _names(methods: tuple[str, ...]) -> list[str]:
 
 
 def _list(context: click.Context) -> None:
-    from .methods import METHODS, build, parameters
-    from .peers import PEERS
+    from onespp.denoise.methods import METHODS, build, parameters
+    from onespp.denoise.peers import PEERS
 
     about = {name: (method.__doc__ or "").splitlines()[0] for name, method in METHODS.items()}
     about.update({name: peer.about + ("" if peer.available() else " Not available here.")

@@ -1,0 +1,1 @@
+"""The commands that denoise, time, score and compare."""
