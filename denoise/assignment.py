@@ -12,13 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Generic
 
+from onespp.denoise.jit.arrays import Color
+from onespp.denoise.jit.grid import Stencil
 from onespp.render.frame import Frame
 
-from .arrays import Color
 from .atrous import Atrous, AtrousState
 from .bilateral import Bilateral, BilateralState
 from .lanes import OnLanes, State
-from .stencil import Stencil
 from .surface import Surface
 from .temporal import Temporal, TemporalState
 

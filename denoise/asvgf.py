@@ -26,16 +26,16 @@ from typing import ClassVar, NamedTuple
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.jit.arrays import Float
+from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, window
+from onespp.denoise.jit.structure import evaluate, mapped
 from onespp.render.channels import REPLAY
 from onespp.render.frame import Frame
 
-from .arrays import Float
 from .atrous import LARGEST_LEVELS, SPLINE
 from .history import RecordState
 from .lanes import OnLanes
 from .parameters import check_positive, check_range, check_whole
-from .stencil import Planes, Stencil, Step, Taps, window
-from .structure import evaluate, mapped
 from .svgf import Passes, Svgf
 
 STRATUM = 3          # pixels, side

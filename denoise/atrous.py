@@ -37,15 +37,15 @@ from typing import NamedTuple
 
 import drjit as dr
 
+from onespp.denoise.jit.arrays import Color, Float, Vector3
+from onespp.denoise.jit.fastmath import exp2
+from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, single, window
+from onespp.denoise.jit.structure import evaluate
 from onespp.render.frame import Frame
 
-from .arrays import Color, Float, Vector3
 from .demodulation import read_texture
-from .exponential import exp2
 from .lanes import OnLanes
 from .parameters import check_positive, check_whole
-from .stencil import Planes, Stencil, Step, Taps, single, window
-from .structure import evaluate
 from .surface import LUMINANCE, Surface, TangentPlane, luminance
 
 LOG2E = 1.4426950408889634

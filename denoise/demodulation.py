@@ -15,10 +15,9 @@ from dataclasses import dataclass
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.jit.arrays import Bool, Color
+from onespp.denoise.jit.grid import Stencil
 from onespp.render.frame import Frame
-
-from .arrays import Bool, Color
-from .stencil import Stencil
 
 CHANNELS = ("albedo", "emission")  # used where a frame has them
 SMALLEST_ALBEDO = 1e-2

@@ -17,10 +17,12 @@ from typing import Any, ClassVar, TypeVar
 
 import drjit as dr
 
+from onespp.denoise.jit.arrays import Bool, Color, Float, Vector3
+from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, window
+from onespp.denoise.jit.structure import arrays_of, build, evaluate, flatten
 from onespp.render.channels import SHADOW
 from onespp.render.frame import Frame
 
-from .arrays import Bool, Color, Float, Vector3
 from .atrous import BACKGROUND, LARGEST_LEVELS, LOG2E
 from .history import RecordState, no_history
 from .innovation import (
@@ -49,8 +51,6 @@ from .shadow_motion import (
 )
 from .signal_layout import ENERGY_LEVELS, History, PlaneRule, SignalLayout, Smoothed
 from .signals import USED, Signal, SignalKind, read_signals
-from .stencil import Planes, Stencil, Step, Taps, window
-from .structure import arrays_of, build, evaluate, flatten
 from .surface import Surface, SurfaceSample, TangentPlane
 
 _OUTSIDE = -1e15          # 1/z outside the image

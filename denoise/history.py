@@ -16,13 +16,13 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import drjit as dr
 
+from onespp.denoise.jit.arrays import Bool, Float, Vector3
+from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.masked import weighted_sums
+from onespp.denoise.jit.structure import arrays_of
 from onespp.render.frame import Frame
 
-from .arrays import Bool, Float, Vector3
 from .reprojection import LEAST_WEIGHT, Place
-from .sparse import weighted_sums
-from .stencil import Stencil
-from .structure import arrays_of
 from .surface import SurfaceSample, dot
 
 PassesT = TypeVar("PassesT")

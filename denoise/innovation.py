@@ -53,18 +53,19 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from .arrays import Bool, Float
+from onespp.denoise.jit.arrays import Bool, Float
+from onespp.denoise.jit.fastmath import exp2
+from onespp.denoise.jit.grid import Offset, Stencil, Taps, window
+from onespp.denoise.jit.masked import tabulate, weighted_sums, window_taps
+from onespp.denoise.jit.structure import mapped
+
 from .atrous import EPSILON, LOG2E
-from .exponential import exp2
 from .history import look_up, pack_records
 from .penumbra import footprint_falloff
 from .reprojection import Motion, ReprojectionTests, locate
 from .shadow_motion import MIN_SHARE, Shadows, look_up_shadow
 from .signal_layout import History, NoisySignal, PlaneRule, SignalLayout, Smoothed
 from .signals import Signal, SignalKind
-from .sparse import tabulate, weighted_sums, window_taps
-from .stencil import Offset, Stencil, Taps, window
-from .structure import mapped
 from .surface import SurfaceSample, TangentPlane
 
 BINOMIAL = {0: 1 / 2, 1: 1 / 4}

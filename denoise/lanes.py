@@ -6,11 +6,11 @@ from typing import ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
+from onespp.denoise.jit.arrays import Color
+from onespp.denoise.jit.grid import Stencil
 from onespp.render.frame import Frame
 
-from .arrays import Color
 from .debts import repay
-from .stencil import Stencil
 from .surface import GUIDES, Surface, read_color, read_surface
 
 

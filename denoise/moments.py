@@ -23,14 +23,15 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from .arrays import Float
+from onespp.denoise.jit.arrays import Float
+from onespp.denoise.jit.fastmath import exp2
+from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.masked import tabulate, weighted_sums, window_taps
+from onespp.denoise.jit.structure import arrays_of
+
 from .atrous import LuminanceColor
-from .exponential import exp2
 from .history import look_up
 from .reprojection import Motion, ReprojectionTests, locate
-from .sparse import tabulate, weighted_sums, window_taps
-from .stencil import Stencil
-from .structure import arrays_of
 from .surface import SurfaceSample
 from .wavelet import Geometry, Guides, geometry_exponent, guides_of
 

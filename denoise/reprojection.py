@@ -29,11 +29,11 @@ from typing import NamedTuple
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.jit.arrays import Bool, Color, Float, Matrix3, UInt, Vector3
+from onespp.denoise.jit.grid import Stencil
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 
-from .arrays import Bool, Color, Float, Matrix3, UInt, Vector3
-from .stencil import Stencil
 from .surface import SurfaceSample, cross, dot, opaque_matrix, transform
 from .view import camera_from_screen, screen_from_camera, world_motions
 

@@ -21,9 +21,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from onespp.denoise.jit.arrays import Color
+from onespp.denoise.jit.grid import Stencil, Step
+from onespp.denoise.jit.structure import evaluate
 from onespp.render.frame import Frame
 
-from .arrays import Color
 from .bilateral import (
     OUTSIDE,
     Bilateral,
@@ -35,8 +37,6 @@ from .bilateral import (
     no_taps,
 )
 from .demodulation import read_texture
-from .stencil import Stencil, Step
-from .structure import evaluate
 from .surface import Surface
 
 

@@ -26,15 +26,15 @@ from typing import Any, NamedTuple
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.jit.arrays import Bool, Float, Matrix3, Vector3
+from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.masked import weighted_sums
 from onespp.render.channels import SHADOW
 from onespp.render.frame import Frame
 
-from .arrays import Bool, Float, Matrix3, Vector3
 from .history import look_up
 from .penumbra import PenumbraSample, light_sizes, penumbra_samples
 from .reprojection import Motion, ReprojectionTests, ScreenShift, locate
-from .sparse import weighted_sums
-from .stencil import Stencil
 from .surface import SurfaceSample, TangentPlane, dot, opaque_matrix, transform
 from .view import inverses, screen_from_camera, world_motions
 

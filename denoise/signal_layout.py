@@ -16,10 +16,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeVar
 
+from onespp.denoise.jit.arrays import Float
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 
-from .arrays import Float
 from .shadow_motion import CHOICE_LEVELS
 from .signals import Signal, SignalKind
 

@@ -23,13 +23,13 @@ from typing import NamedTuple
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.jit.arrays import Color, Float
+from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.structure import arrays_of
 from onespp.render.frame import Frame
 
-from .arrays import Color, Float
 from .atrous import LuminanceColor, with_green
 from .demodulation import Texture, read_texture
-from .stencil import Stencil
-from .structure import arrays_of
 from .surface import luminance, repair
 
 USED = ("direct", "indirect", "unshadowed", "visibility", "specular")

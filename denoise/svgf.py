@@ -22,9 +22,11 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from onespp.denoise.jit.arrays import Color, Float
+from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, single, window
+from onespp.denoise.jit.structure import evaluate
 from onespp.render.frame import Frame
 
-from .arrays import Color, Float
 from .atrous import (
     LARGEST_LEVELS,
     LOG2E,
@@ -49,8 +51,6 @@ from .moments import (
 )
 from .parameters import HISTORY_RENAMED, check_positive, check_range, check_whole
 from .reprojection import Motion, ReprojectionTests, motion_between, without_images
-from .stencil import Planes, Stencil, Step, Taps, single, window
-from .structure import evaluate
 from .surface import Surface, SurfaceSample, repair
 from .wavelet import OUTSIDE, Geometry, Guides, LevelWeights, filter_level, guides_of, read_geometry
 

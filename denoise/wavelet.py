@@ -22,10 +22,11 @@ from typing import NamedTuple
 
 import drjit as dr
 
-from .arrays import Float, Vector3
+from onespp.denoise.jit.arrays import Float, Vector3
+from onespp.denoise.jit.fastmath import exp2
+from onespp.denoise.jit.grid import Stencil, Taps, window
+
 from .atrous import LOG2E, SPLINE, LuminanceColor, LuminanceWeight, NoisyColor
-from .exponential import exp2
-from .stencil import Stencil, Taps, window
 from .surface import Surface
 
 EPSILON_DEPTH = 1e-3

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from .arrays import Color, Float
-from .stencil import Planes, Stencil, Step, Taps
-from .structure import evaluate
+from onespp.denoise.jit.arrays import Color, Float
+from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps
+from onespp.denoise.jit.structure import evaluate
 
 
 class MeanVariance(NamedTuple):

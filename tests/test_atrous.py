@@ -4,7 +4,7 @@ import pytest
 
 from onespp.denoise import oracles
 from onespp.denoise.atrous import Atrous, estimate_variance
-from onespp.denoise.stencil import Stencil
+from onespp.denoise.jit.grid import Stencil
 from onespp.render.errors import InputError
 
 from .kernels import compiled, taking_turns

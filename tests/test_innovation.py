@@ -9,8 +9,8 @@ import pytest
 
 from onespp.denoise import lanes
 from onespp.denoise.filtered_innovation import FilteredInnovation
+from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.signals import USED, read_signals
-from onespp.denoise.stencil import Stencil
 from onespp.denoise.surface import read_color
 from onespp.render.errors import InputError
 from tests import innovation_oracle

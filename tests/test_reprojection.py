@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from onespp.denoise import oracles
+from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.reprojection import locate, motion_between, motion_table
-from onespp.denoise.stencil import Stencil
 from onespp.denoise.surface import read_surface
 from onespp.denoise.temporal import Temporal
 

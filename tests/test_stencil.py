@@ -11,11 +11,11 @@ import pytest
 from onespp.denoise.assignment import Assignment, AssignmentAtrous
 from onespp.denoise.atrous import Atrous
 from onespp.denoise.bilateral import Bilateral
-from onespp.denoise.exponential import exp2
+from onespp.denoise.jit.fastmath import exp2
+from onespp.denoise.jit.grid import Stencil, Step, Taps
+from onespp.denoise.jit.structure import build, evaluate, flatten
 from onespp.denoise.reprojection import load_table
 from onespp.denoise.run.timed import timed
-from onespp.denoise.stencil import Stencil, Step, Taps
-from onespp.denoise.structure import build, evaluate, flatten
 from onespp.denoise.temporal import Temporal
 from onespp.render.errors import InputError
 
@@ -437,7 +437,7 @@ import gc
 import denoise
 import drjit.llvm as llvm
 import numpy as np
-from onespp.denoise.stencil import Step
+from onespp.denoise.jit.grid import Step
 
 class Cycle:
     pass

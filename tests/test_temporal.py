@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from onespp.denoise import oracles
-from onespp.denoise.arrays import Color
-from onespp.denoise.stencil import Stencil
+from onespp.denoise.jit.arrays import Color
+from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.temporal import Temporal
 from onespp.denoise.window_moments import RowPass, window_moments
 from onespp.render.errors import InputError

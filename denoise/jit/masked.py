@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 
 from .arrays import Bool, Float
-from .stencil import Stencil
+from .grid import Stencil
 
 WORDS = 8  # floats a lane in the table of a window: what one gather brings
 

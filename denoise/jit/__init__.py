@@ -1,0 +1,1 @@
+"""Images as Dr.Jit arrays: grids, padded planes, recorded steps. Knows nothing of denoising."""
