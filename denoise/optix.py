@@ -14,11 +14,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from onespp.denoise.geometry.correspondence import NOWHERE, previous_pixel
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.host import backend
 
-from .correspondence import NOWHERE, previous_pixel
 from .surface import GUIDES, repair
 
 

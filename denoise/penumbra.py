@@ -25,11 +25,10 @@ from typing import NamedTuple
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.geometry.cameras import camera_from_screen
 from onespp.denoise.jit.arrays import Bool, Float
 from onespp.denoise.jit.grid import Stencil
 from onespp.render.frame import Frame
-
-from .view import camera_from_screen
 
 _SAMPLES = 2048   # pixels that sizes of lights are estimated from
 _FEWEST = 4       # points of a light, or its size is not known

@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.geometry.cameras import inverses, screen_from_camera, world_motions
 from onespp.denoise.jit.arrays import Bool, Float, Matrix3, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.masked import weighted_sums
@@ -36,7 +37,6 @@ from .history import look_up
 from .penumbra import PenumbraSample, light_sizes, penumbra_samples
 from .reprojection import Motion, ReprojectionTests, ScreenShift, locate
 from .surface import SurfaceSample, TangentPlane, dot, opaque_matrix, transform
-from .view import inverses, screen_from_camera, world_motions
 
 SPREAD_LEVEL = 2  # of the smoothing by which motion spreads
 CHOICE_LEVELS = 5  # of the smoothing of squared innovations

@@ -20,12 +20,11 @@ from typing import NamedTuple
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.geometry.cameras import camera_from_screen
 from onespp.denoise.jit.arrays import Bool, Color, Float, Matrix3, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
-
-from .view import camera_from_screen
 
 GUIDES = ("normal", "depth", "id")
 LUMINANCE = (0.2126, 0.7152, 0.0722)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from onespp.denoise.correspondence import NOWHERE, previous_pixel
+from onespp.denoise.geometry.correspondence import NOWHERE, previous_pixel
 from onespp.denoise.score.causes import (
     CAUSES,
     HISTORIES,

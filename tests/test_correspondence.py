@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from onespp.denoise.correspondence import NOWHERE, carry, previous_pixel
+from onespp.denoise.geometry.correspondence import NOWHERE, carry, previous_pixel
 from onespp.render.frame import Frame
 
 from .synthetic import make_frame, translation, turn, with_images

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from onespp.denoise.correspondence import NOWHERE
+from onespp.denoise.geometry.correspondence import NOWHERE
 from onespp.denoise.metrics.flicker import STABILITY, Step, boiling, difference_psnr, flicker
 from onespp.denoise.metrics.table import PSNR_CAP
 

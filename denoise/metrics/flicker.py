@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from onespp.denoise.correspondence import NOWHERE, carry
+from onespp.denoise.geometry.correspondence import NOWHERE, carry
 
 from .table import METRICS, Metric, decibels, mse
 

@@ -15,7 +15,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from onespp.denoise.correspondence import MIN_COSINE, NOWHERE, carry, has_surface
+from onespp.denoise.geometry.correspondence import MIN_COSINE, NOWHERE, carry, has_surface
 from onespp.denoise.metrics.luminance import luminance
 from onespp.render.files.sequence import Reference
 from onespp.render.frame import Frame

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from onespp.denoise.correspondence import GUIDES, NOWHERE, previous_pixel
+from onespp.denoise.geometry.correspondence import GUIDES, NOWHERE, previous_pixel
 from onespp.render.files.sequence import Reference, Sequence
 from onespp.render.frame import Frame
 

@@ -1,0 +1,1 @@
+"""Cameras, motion and correspondence in NumPy float64."""
