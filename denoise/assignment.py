@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Generic
 
+from onespp.denoise.inputs.surface import Surface
 from onespp.denoise.jit.arrays import Color
 from onespp.denoise.jit.grid import Stencil
 from onespp.render.frame import Frame
@@ -19,7 +20,6 @@ from onespp.render.frame import Frame
 from .atrous import Atrous, AtrousState
 from .bilateral import Bilateral, BilateralState
 from .lanes import OnLanes, State
-from .surface import Surface
 from .temporal import Temporal, TemporalState
 
 

@@ -37,16 +37,16 @@ from typing import NamedTuple
 
 import drjit as dr
 
+from onespp.denoise.inputs.demodulation import read_texture
+from onespp.denoise.inputs.surface import LUMINANCE, Surface, TangentPlane, luminance
 from onespp.denoise.jit.arrays import Color, Float, Vector3
 from onespp.denoise.jit.fastmath import exp2
 from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, single, window
 from onespp.denoise.jit.structure import evaluate
 from onespp.render.frame import Frame
 
-from .demodulation import read_texture
 from .lanes import OnLanes
 from .parameters import check_positive, check_whole
-from .surface import LUMINANCE, Surface, TangentPlane, luminance
 
 LOG2E = 1.4426950408889634
 SPLINE = {0: 3 / 8, 1: 1 / 4, 2: 1 / 16}

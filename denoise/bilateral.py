@@ -28,16 +28,16 @@ from typing import NamedTuple
 
 import drjit as dr
 
+from onespp.denoise.inputs.demodulation import read_texture
+from onespp.denoise.inputs.surface import Surface
 from onespp.denoise.jit.arrays import Color, Float, Vector3
 from onespp.denoise.jit.fastmath import exp2
 from onespp.denoise.jit.grid import Offset, Planes, Stencil, Step, Taps
 from onespp.denoise.jit.structure import evaluate
 from onespp.render.frame import Frame
 
-from .demodulation import read_texture
 from .lanes import OnLanes
 from .parameters import check_positive, check_whole
-from .surface import Surface
 
 LOG2E = 1.4426950408889634
 # acos^2(1 - t) / t on [0, 1], relative error below 0.0026 (t + 0.02); beyond, it only grows.

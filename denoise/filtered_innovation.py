@@ -17,6 +17,8 @@ from typing import Any, ClassVar, TypeVar
 
 import drjit as dr
 
+from onespp.denoise.inputs.signals import USED, Signal, SignalKind, read_signals
+from onespp.denoise.inputs.surface import Surface, SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Bool, Color, Float, Vector3
 from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, window
 from onespp.denoise.jit.structure import arrays_of, build, evaluate, flatten
@@ -50,8 +52,6 @@ from .shadow_motion import (
     read_shadow_rays,
 )
 from .signal_layout import ENERGY_LEVELS, History, PlaneRule, SignalLayout, Smoothed
-from .signals import USED, Signal, SignalKind, read_signals
-from .surface import Surface, SurfaceSample, TangentPlane
 
 _OUTSIDE = -1e15          # 1/z outside the image
 _BLACK = 2 * BACKGROUND   # 1/z of a surface that reflects nothing: a lamp

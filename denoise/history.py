@@ -16,6 +16,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import drjit as dr
 
+from onespp.denoise.inputs.surface import SurfaceSample, dot
 from onespp.denoise.jit.arrays import Bool, Float, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.masked import weighted_sums
@@ -23,7 +24,6 @@ from onespp.denoise.jit.structure import arrays_of
 from onespp.render.frame import Frame
 
 from .reprojection import LEAST_WEIGHT, Place
-from .surface import SurfaceSample, dot
 
 PassesT = TypeVar("PassesT")
 

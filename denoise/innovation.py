@@ -53,6 +53,8 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from onespp.denoise.inputs.signals import Signal, SignalKind
+from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Bool, Float
 from onespp.denoise.jit.fastmath import exp2
 from onespp.denoise.jit.grid import Offset, Stencil, Taps, window
@@ -65,8 +67,6 @@ from .penumbra import footprint_falloff
 from .reprojection import Motion, ReprojectionTests, locate
 from .shadow_motion import MIN_SHARE, Shadows, look_up_shadow
 from .signal_layout import History, NoisySignal, PlaneRule, SignalLayout, Smoothed
-from .signals import Signal, SignalKind
-from .surface import SurfaceSample, TangentPlane
 
 BINOMIAL = {0: 1 / 2, 1: 1 / 4}
 MIN_NOISE = 0.25               # share of the innovation's energy that is at least noise of d

@@ -19,6 +19,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from onespp.denoise.inputs.demodulation import CHANNELS as TEXTURE
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 
@@ -26,7 +27,6 @@ from .assignment import Assignment, AssignmentAtrous
 from .asvgf import Asvgf
 from .atrous import Atrous
 from .bilateral import Bilateral
-from .demodulation import CHANNELS as TEXTURE
 from .filtered_innovation import FilteredInnovation
 from .outliers import RemoveOutliers, WithoutOutliers
 from .parameters import renamed_parameters, with_present_names

@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from onespp.denoise.inputs.surface import SurfaceSample
 from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.fastmath import exp2
 from onespp.denoise.jit.grid import Stencil
@@ -32,7 +33,6 @@ from onespp.denoise.jit.structure import arrays_of
 from .atrous import LuminanceColor
 from .history import look_up
 from .reprojection import Motion, ReprojectionTests, locate
-from .surface import SurfaceSample
 from .wavelet import Geometry, Guides, geometry_exponent, guides_of
 
 FORGETTING = 10      # power of 1 - lambda that a length is multiplied by

@@ -18,11 +18,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from onespp.denoise.inputs.surface import repair
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 
 from .parameters import check_choice
-from .surface import repair
 from .temporal import Temporal, TemporalState
 
 AVAILABLE = importlib.util.find_spec("pyoidn") is not None

@@ -15,11 +15,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from onespp.denoise.geometry.correspondence import NOWHERE, previous_pixel
+from onespp.denoise.inputs.surface import GUIDES, repair
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.host import backend
-
-from .surface import GUIDES, repair
 
 
 @dataclass(frozen=True)

@@ -27,15 +27,15 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.inputs.demodulation import Texture, read_texture
+from onespp.denoise.inputs.surface import GUIDES, TangentPlane, check_size, read_surface, repair
 from onespp.denoise.jit.arrays import Color, Float
 from onespp.denoise.jit.grid import Offset, Planes, Stencil, Step, Taps, window
 from onespp.denoise.jit.structure import evaluate
 from onespp.denoise.metrics.luminance import luminance
 from onespp.render.frame import Frame
 
-from .demodulation import Texture, read_texture
 from .parameters import check_positive, check_whole
-from .surface import GUIDES, TangentPlane, check_size, read_surface, repair
 
 FEWEST = 4
 _PARTS = ("direct", "indirect", "specular")

@@ -30,12 +30,11 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.geometry.cameras import camera_from_screen, screen_from_camera, world_motions
+from onespp.denoise.inputs.surface import SurfaceSample, cross, dot, opaque_matrix, transform
 from onespp.denoise.jit.arrays import Bool, Color, Float, Matrix3, UInt, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
-
-from .surface import SurfaceSample, cross, dot, opaque_matrix, transform
 
 LEAST_WEIGHT = 0.01
 WORDS = 8            # a pixel of packed history: colour 3, object ID, normal 3, depth

@@ -21,6 +21,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from onespp.denoise.inputs.demodulation import read_texture
+from onespp.denoise.inputs.surface import Surface
 from onespp.denoise.jit.arrays import Color
 from onespp.denoise.jit.grid import Stencil, Step
 from onespp.denoise.jit.structure import evaluate
@@ -36,8 +38,6 @@ from .bilateral import (
     add_taps,
     no_taps,
 )
-from .demodulation import read_texture
-from .surface import Surface
 
 
 @dataclass(frozen=True)

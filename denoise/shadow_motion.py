@@ -27,6 +27,7 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.geometry.cameras import inverses, screen_from_camera, world_motions
+from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane, dot, opaque_matrix, transform
 from onespp.denoise.jit.arrays import Bool, Float, Matrix3, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.masked import weighted_sums
@@ -36,7 +37,6 @@ from onespp.render.frame import Frame
 from .history import look_up
 from .penumbra import PenumbraSample, light_sizes, penumbra_samples
 from .reprojection import Motion, ReprojectionTests, ScreenShift, locate
-from .surface import SurfaceSample, TangentPlane, dot, opaque_matrix, transform
 
 SPREAD_LEVEL = 2  # of the smoothing by which motion spreads
 CHOICE_LEVELS = 5  # of the smoothing of squared innovations

@@ -22,6 +22,8 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from onespp.denoise.inputs.demodulation import Texture, read_texture
+from onespp.denoise.inputs.surface import Surface, SurfaceSample, repair
 from onespp.denoise.jit.arrays import Color, Float
 from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, single, window
 from onespp.denoise.jit.structure import evaluate
@@ -38,7 +40,6 @@ from .atrous import (
     with_green,
     with_luminance,
 )
-from .demodulation import Texture, read_texture
 from .history import RecordState, no_history, pack_records
 from .lanes import OnLanes
 from .moments import (
@@ -51,7 +52,6 @@ from .moments import (
 )
 from .parameters import HISTORY_RENAMED, check_positive, check_range, check_whole
 from .reprojection import Motion, ReprojectionTests, motion_between, without_images
-from .surface import Surface, SurfaceSample, repair
 from .wavelet import OUTSIDE, Geometry, Guides, LevelWeights, filter_level, guides_of, read_geometry
 
 SIGNALS = ("direct", "indirect")

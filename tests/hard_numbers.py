@@ -12,8 +12,8 @@ import numpy as np
 
 import onespp  # noqa: F401 - finds LLVM before anything imports Dr.Jit
 from onespp.denoise import oracles
+from onespp.denoise.inputs.surface import GUIDES
 from onespp.denoise.methods import METHODS, build, parameters
-from onespp.denoise.surface import GUIDES
 from onespp.denoise.temporal import Temporal
 from onespp.render.frame import Frame
 from onespp.render.tracer.renderer import Renderer

@@ -9,9 +9,9 @@ import pytest
 
 from onespp.denoise import lanes
 from onespp.denoise.filtered_innovation import FilteredInnovation
+from onespp.denoise.inputs.signals import USED, read_signals
+from onespp.denoise.inputs.surface import read_color
 from onespp.denoise.jit.grid import Stencil
-from onespp.denoise.signals import USED, read_signals
-from onespp.denoise.surface import read_color
 from onespp.render.errors import InputError
 from tests import innovation_oracle
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from onespp.denoise.inputs.surface import repair
 from onespp.denoise.methods import METHODS, build, parameters
 from onespp.denoise.run.timed import timed
-from onespp.denoise.surface import repair
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 

@@ -24,10 +24,10 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise import oracles
+from onespp.denoise.inputs.surface import read_color, read_surface
 from onespp.denoise.methods import build
 from onespp.denoise.oidn import AVAILABLE, Oidn
 from onespp.denoise.run.timed import timed
-from onespp.denoise.surface import read_color, read_surface
 from onespp.render.frame import Frame
 from onespp.render.host import backend
 

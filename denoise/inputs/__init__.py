@@ -1,0 +1,1 @@
+"""A frame as kernels read it: surfaces, colour, signals, shadow rays."""
