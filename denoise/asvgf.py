@@ -26,6 +26,7 @@ from typing import ClassVar, NamedTuple
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.history.records import RecordState
 from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, window
 from onespp.denoise.jit.structure import evaluate, mapped
@@ -33,7 +34,6 @@ from onespp.render.channels import REPLAY
 from onespp.render.frame import Frame
 
 from .atrous import LARGEST_LEVELS, SPLINE
-from .history import RecordState
 from .lanes import OnLanes
 from .parameters import check_positive, check_range, check_whole
 from .svgf import Passes, Svgf

@@ -17,6 +17,16 @@ from typing import Any, ClassVar, TypeVar
 
 import drjit as dr
 
+from onespp.denoise.history.records import RecordState, no_history
+from onespp.denoise.history.reprojection import ReprojectionTests, motion_between, without_images
+from onespp.denoise.history.shadow_motion import (
+    SPREAD_LEVEL,
+    ShadowRays,
+    Shadows,
+    follow_shadows,
+    has_shadow_rays,
+    read_shadow_rays,
+)
 from onespp.denoise.inputs.signals import USED, Signal, SignalKind, read_signals
 from onespp.denoise.inputs.surface import Surface, SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Bool, Color, Float, Vector3
@@ -26,7 +36,6 @@ from onespp.render.channels import SHADOW
 from onespp.render.frame import Frame
 
 from .atrous import BACKGROUND, LARGEST_LEVELS, LOG2E
-from .history import RecordState, no_history
 from .innovation import (
     Gains,
     Innovations,
@@ -42,15 +51,6 @@ from .innovation import (
 )
 from .lanes import OnLanes
 from .parameters import INNOVATION_RENAMED, check_positive, check_range, check_whole
-from .reprojection import ReprojectionTests, motion_between, without_images
-from .shadow_motion import (
-    SPREAD_LEVEL,
-    ShadowRays,
-    Shadows,
-    follow_shadows,
-    has_shadow_rays,
-    read_shadow_rays,
-)
 from .signal_layout import ENERGY_LEVELS, History, PlaneRule, SignalLayout, Smoothed
 
 _OUTSIDE = -1e15          # 1/z outside the image

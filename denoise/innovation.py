@@ -53,6 +53,9 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from onespp.denoise.history.records import look_up, pack_records
+from onespp.denoise.history.reprojection import Motion, ReprojectionTests, locate
+from onespp.denoise.history.shadow_motion import MIN_SHARE, Shadows, look_up_shadow
 from onespp.denoise.inputs.signals import Signal, SignalKind
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Bool, Float
@@ -62,10 +65,7 @@ from onespp.denoise.jit.masked import tabulate, weighted_sums, window_taps
 from onespp.denoise.jit.structure import mapped
 
 from .atrous import EPSILON, LOG2E
-from .history import look_up, pack_records
 from .penumbra import footprint_falloff
-from .reprojection import Motion, ReprojectionTests, locate
-from .shadow_motion import MIN_SHARE, Shadows, look_up_shadow
 from .signal_layout import History, NoisySignal, PlaneRule, SignalLayout, Smoothed
 
 BINOMIAL = {0: 1 / 2, 1: 1 / 4}

@@ -23,6 +23,8 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from onespp.denoise.history.records import look_up
+from onespp.denoise.history.reprojection import Motion, ReprojectionTests, locate
 from onespp.denoise.inputs.surface import SurfaceSample
 from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.fastmath import exp2
@@ -31,8 +33,6 @@ from onespp.denoise.jit.masked import tabulate, weighted_sums, window_taps
 from onespp.denoise.jit.structure import arrays_of
 
 from .atrous import LuminanceColor
-from .history import look_up
-from .reprojection import Motion, ReprojectionTests, locate
 from .wavelet import Geometry, Guides, geometry_exponent, guides_of
 
 FORGETTING = 10      # power of 1 - lambda that a length is multiplied by

@@ -16,12 +16,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeVar
 
+from onespp.denoise.history.shadow_motion import CHOICE_LEVELS
 from onespp.denoise.inputs.signals import Signal, SignalKind
 from onespp.denoise.jit.arrays import Float
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
-
-from .shadow_motion import CHOICE_LEVELS
 
 T = TypeVar("T")
 ENERGY_LEVELS = 2

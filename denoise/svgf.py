@@ -22,6 +22,13 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from onespp.denoise.history.records import RecordState, no_history, pack_records
+from onespp.denoise.history.reprojection import (
+    Motion,
+    ReprojectionTests,
+    motion_between,
+    without_images,
+)
 from onespp.denoise.inputs.demodulation import Texture, read_texture
 from onespp.denoise.inputs.surface import Surface, SurfaceSample, repair
 from onespp.denoise.jit.arrays import Color, Float
@@ -40,7 +47,6 @@ from .atrous import (
     with_green,
     with_luminance,
 )
-from .history import RecordState, no_history, pack_records
 from .lanes import OnLanes
 from .moments import (
     SHORT,
@@ -51,7 +57,6 @@ from .moments import (
     tabulate_moments,
 )
 from .parameters import HISTORY_RENAMED, check_positive, check_range, check_whole
-from .reprojection import Motion, ReprojectionTests, motion_between, without_images
 from .wavelet import OUTSIDE, Geometry, Guides, LevelWeights, filter_level, guides_of, read_geometry
 
 SIGNALS = ("direct", "indirect")

@@ -21,6 +21,14 @@ from typing import NamedTuple
 
 import drjit as dr
 
+from onespp.denoise.history.reprojection import (
+    Motion,
+    ReprojectionTests,
+    motion_between,
+    pack,
+    reproject,
+    without_images,
+)
 from onespp.denoise.inputs.surface import Surface, SurfaceSample
 from onespp.denoise.jit.arrays import Color, Float
 from onespp.denoise.jit.grid import Stencil, Step, Taps
@@ -29,7 +37,6 @@ from onespp.render.frame import Frame
 
 from .lanes import OnLanes
 from .parameters import check_positive, check_range, check_whole
-from .reprojection import Motion, ReprojectionTests, motion_between, pack, reproject, without_images
 from .window_moments import RowMoments, RowPass, window_moments
 
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from onespp.denoise import oracles
+from onespp.denoise.history.reprojection import locate, motion_between, motion_table
 from onespp.denoise.inputs.surface import read_surface
 from onespp.denoise.jit.grid import Stencil
-from onespp.denoise.reprojection import locate, motion_between, motion_table
 from onespp.denoise.temporal import Temporal
 
 from .synthetic import make_frame, translation, turn, with_images

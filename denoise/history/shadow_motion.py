@@ -31,11 +31,11 @@ from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane, dot, opaq
 from onespp.denoise.jit.arrays import Bool, Float, Matrix3, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.masked import weighted_sums
+from onespp.denoise.penumbra import PenumbraSample, light_sizes, penumbra_samples
 from onespp.render.channels import SHADOW
 from onespp.render.frame import Frame
 
-from .history import look_up
-from .penumbra import PenumbraSample, light_sizes, penumbra_samples
+from .records import look_up
 from .reprojection import Motion, ReprojectionTests, ScreenShift, locate
 
 SPREAD_LEVEL = 2  # of the smoothing by which motion spreads

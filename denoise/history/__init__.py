@@ -1,0 +1,1 @@
+"""Reprojection, and what is carried along it."""
