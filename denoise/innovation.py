@@ -53,6 +53,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from onespp.denoise.filters.penumbra import footprint_falloff
 from onespp.denoise.history.records import look_up, pack_records
 from onespp.denoise.history.reprojection import Motion, ReprojectionTests, locate
 from onespp.denoise.history.shadow_motion import MIN_SHARE, Shadows, look_up_shadow
@@ -65,7 +66,6 @@ from onespp.denoise.jit.masked import tabulate, weighted_sums, window_taps
 from onespp.denoise.jit.structure import mapped
 
 from .atrous import EPSILON, LOG2E
-from .penumbra import footprint_falloff
 from .signal_layout import History, NoisySignal, PlaneRule, SignalLayout, Smoothed
 
 BINOMIAL = {0: 1 / 2, 1: 1 / 4}

@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from onespp.denoise.filters.svgf_level import Geometry, Guides, geometry_exponent, guides_of
 from onespp.denoise.history.records import look_up
 from onespp.denoise.history.reprojection import Motion, ReprojectionTests, locate
 from onespp.denoise.inputs.surface import SurfaceSample
@@ -33,7 +34,6 @@ from onespp.denoise.jit.masked import tabulate, weighted_sums, window_taps
 from onespp.denoise.jit.structure import arrays_of
 
 from .atrous import LuminanceColor
-from .wavelet import Geometry, Guides, geometry_exponent, guides_of
 
 FORGETTING = 10      # power of 1 - lambda that a length is multiplied by
 SHORT = 4.0          # frames of history from which on its moments give the variance

@@ -22,6 +22,15 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from onespp.denoise.filters.svgf_level import (
+    OUTSIDE,
+    Geometry,
+    Guides,
+    LevelWeights,
+    filter_level,
+    guides_of,
+    read_geometry,
+)
 from onespp.denoise.history.records import RecordState, no_history, pack_records
 from onespp.denoise.history.reprojection import (
     Motion,
@@ -57,7 +66,6 @@ from .moments import (
     tabulate_moments,
 )
 from .parameters import HISTORY_RENAMED, check_positive, check_range, check_whole
-from .wavelet import OUTSIDE, Geometry, Guides, LevelWeights, filter_level, guides_of, read_geometry
 
 SIGNALS = ("direct", "indirect")
 _VARIANCE = 3  # which plane of a `NoisyColor`

@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import drjit as dr
 
+from onespp.denoise.filters.color_box import RowMoments, RowPass, window_moments
 from onespp.denoise.history.reprojection import (
     Motion,
     ReprojectionTests,
@@ -37,7 +38,6 @@ from onespp.render.frame import Frame
 
 from .lanes import OnLanes
 from .parameters import check_positive, check_range, check_whole
-from .window_moments import RowMoments, RowPass, window_moments
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from onespp.denoise import lanes
-from onespp.denoise.debts import repay
+from onespp.denoise.filters.debts import repay
 from onespp.denoise.methods import build
 from onespp.render.frame import Frame
 

@@ -26,12 +26,12 @@ from typing import Any, NamedTuple
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.filters.penumbra import PenumbraSample, light_sizes, penumbra_samples
 from onespp.denoise.geometry.cameras import inverses, screen_from_camera, world_motions
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane, dot, opaque_matrix, transform
 from onespp.denoise.jit.arrays import Bool, Float, Matrix3, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.masked import weighted_sums
-from onespp.denoise.penumbra import PenumbraSample, light_sizes, penumbra_samples
 from onespp.render.channels import SHADOW
 from onespp.render.frame import Frame
 

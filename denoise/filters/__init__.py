@@ -1,0 +1,1 @@
+"""Filter kernels that several methods share."""
