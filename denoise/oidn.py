@@ -19,11 +19,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from onespp.denoise.inputs.surface import repair
+from onespp.denoise.methods.parameters import check_choice
+from onespp.denoise.methods.temporal import Temporal, TemporalState
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
-
-from .parameters import check_choice
-from .temporal import Temporal, TemporalState
 
 AVAILABLE = importlib.util.find_spec("pyoidn") is not None
 

@@ -21,9 +21,9 @@ import click
 from draw_architecture import imports, modules, rooms, rooms_table, svg
 
 from onespp import app
-from onespp.denoise.methods import METHODS, build
+from onespp.denoise.catalog import METHODS, build
+from onespp.denoise.methods.outliers import RemoveOutliers
 from onespp.denoise.metrics.flicker import MEASURES
-from onespp.denoise.outliers import RemoveOutliers
 from onespp.denoise.peers import PEERS
 from onespp.denoise.score.causes import CAUSES, HISTORIES
 from onespp.render.channels import CHANNELS

@@ -81,7 +81,7 @@ def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
 
 def _judge_hard(name: str, out: Path, reference_spp: int, advance: Callable[[float], None]) -> list:
     """Rows of one hard scene; `advance` is told the share that is done."""
-    from onespp.denoise.methods import METHODS
+    from onespp.denoise.catalog import METHODS
     from onespp.denoise.studies.hard_scenes import judge
     from onespp.render.job import RenderJob, kept_references, render_sequence
     from onespp.scenes.hard import HARD

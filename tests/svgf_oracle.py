@@ -85,7 +85,7 @@ def svgf(frames: list[Frame], alpha: float = 0.2, alpha_moments: float = 0.2,
          demodulate: bool = True, split: bool = True, accumulate: bool = True,
          fallback: bool = True, temporal_variance: bool = True,
          feedback: bool = True) -> np.ndarray:
-    """The last frame's result; parameters as of `onespp.denoise.svgf.Svgf`."""
+    """The last frame's result; parameters as of `onespp.denoise.methods.svgf.Svgf`."""
     records, previous, result = None, frames[0], np.zeros(0)
     for frame in frames:
         shape = frame["id"].shape

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from onespp.denoise.methods import parameters
+from onespp.denoise.catalog import parameters
 from onespp.denoise.studies.ablation import ablate, ablation, markdown, variants
 from onespp.render.cli.terminal import run
 from onespp.render.errors import InputError

@@ -3,8 +3,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from onespp.denoise.asvgf import Asvgf, gather_strata
-from onespp.denoise.svgf import Svgf
+from onespp.denoise.methods.asvgf import Asvgf, gather_strata
+from onespp.denoise.methods.svgf import Svgf
 from onespp.render.errors import InputError
 
 from .made_sequence import make_sequence

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from onespp.denoise import oracles
-from onespp.denoise.atrous import Atrous, estimate_variance
 from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.methods.atrous import Atrous, estimate_variance
 from onespp.render.errors import InputError
 
 from .kernels import compiled, taking_turns

@@ -12,7 +12,7 @@ from rich.console import Console
 import onespp.cli
 from onespp.denoise.bench.kernels import KERNELS, Scaling, max_error, measure_one_thread, scaling
 from onespp.denoise.bench.probe_frames import probe
-from onespp.denoise.methods import METHODS
+from onespp.denoise.catalog import METHODS
 from onespp.denoise.report.bench_table import print_scaling
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from onespp.denoise import oracles
-from onespp.denoise.bilateral import ACOS2, Bilateral
+from onespp.denoise.methods.bilateral import ACOS2, Bilateral
 from onespp.render.errors import InputError
 
 from .kernels import compiled, taking_turns

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from onespp.denoise import lanes
+from onespp.denoise.catalog import build
 from onespp.denoise.filters.debts import repay
-from onespp.denoise.methods import build
+from onespp.denoise.methods import base as lanes
 from onespp.render.frame import Frame
 
 from .innovation_oracle import repaid

@@ -6,7 +6,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from onespp.denoise.methods import build
+from onespp.denoise.catalog import build
 from onespp.render.frame import Frame
 
 DATA = Path(__file__).resolve().parents[2] / "shared/data/games202-box"

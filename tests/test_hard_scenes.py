@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from onespp.denoise.catalog import METHODS, build, parameters
 from onespp.denoise.geometry.correspondence import previous_pixel
-from onespp.denoise.methods import METHODS, build, parameters
 from onespp.denoise.studies.hard_scenes import INPUT, Row, judge, markdown, misses, run_alone
 from onespp.render.channels import REPLAY
 from onespp.render.job import RenderJob, render_sequence

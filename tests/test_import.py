@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from onespp.denoise.methods import build
+from onespp.denoise.catalog import build
 from onespp.denoise.peers import PEERS
 from onespp.denoise.report.html import write_report
 from onespp.denoise.report.terminal import caption

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onespp.denoise import lanes
-from onespp.denoise.filtered_innovation import FilteredInnovation
 from onespp.denoise.inputs.signals import USED, read_signals
 from onespp.denoise.inputs.surface import read_color
 from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.methods import base as lanes
+from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
 from onespp.render.errors import InputError
 from tests import innovation_oracle
 

@@ -40,7 +40,7 @@ def test_what_reads_scores_and_shows_frames_loads_no_compiler():
 
 @pytest.mark.skipif(not MAPS.exists(), reason="what is loaded can be told on Linux alone")
 def test_methods_do_load_it_and_the_test_would_see_it():
-    assert loaded("onespp.denoise.atrous") == [["onespp.denoise.atrous", "drjit", "LLVM"]]
+    assert loaded("onespp.denoise.methods.atrous") == [["onespp.denoise.methods.atrous", "drjit", "LLVM"]]
 
 
 @pytest.mark.skipif(not MAPS.exists(), reason="what is loaded can be told on Linux alone")

@@ -9,7 +9,7 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from onespp.denoise.methods import METHODS, build, parameters
+from onespp.denoise.catalog import METHODS, build, parameters
 from onespp.denoise.run.peak_memory import PeakMemory
 
 from .synthetic import make_frame, noisy, with_images

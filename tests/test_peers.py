@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from onespp.denoise import oidn
-from onespp.denoise.methods import METHODS, build, parameters
+from onespp.denoise.catalog import METHODS, build, parameters
 from onespp.denoise.peers import PEERS
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
@@ -63,7 +63,7 @@ def test_without_cuda_optix_says_so_in_one_line(monkeypatch):
 
 
 def test_no_peer_brings_in_mitsuba_before_it_is_used():
-    code = ("import sys, onespp.denoise.methods; "
+    code = ("import sys, onespp.denoise.catalog; "
             "sys.exit('mitsuba' in sys.modules or 'pyoidn' in sys.modules)")
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 

@@ -8,11 +8,11 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from onespp.denoise.filtered_innovation import FilteredInnovation
 from onespp.denoise.filters.penumbra import PenumbraSample, footprint_falloff, light_sizes
 from onespp.denoise.history.shadow_motion import follow_shadows, read_shadow_rays
 from onespp.denoise.inputs.surface import read_surface
 from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Rectangle, Shape
 from onespp.scenes.transforms import look_at, rotate, scale, translate

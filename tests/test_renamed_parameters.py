@@ -9,17 +9,17 @@ from typing import ClassVar
 
 import pytest
 
-from onespp.denoise.methods import METHODS, build, parameters
-from onespp.denoise.parameters import (
+from onespp.denoise.catalog import METHODS, build, parameters
+from onespp.denoise.methods.parameters import (
     HISTORY_RENAMED,
     INNOVATION_RENAMED,
     present_parameters,
     renamed_parameters,
     with_present_names,
 )
+from onespp.denoise.methods.svgf import Svgf
 from onespp.denoise.run.sequence import denoise_sequence
 from onespp.denoise.studies.tune import Search, starting_point
-from onespp.denoise.svgf import Svgf
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest
 from onespp.render.files.sequence import Sequence

@@ -8,7 +8,7 @@ from onespp.denoise import oracles
 from onespp.denoise.history.reprojection import locate, motion_between, motion_table
 from onespp.denoise.inputs.surface import read_surface
 from onespp.denoise.jit.grid import Stencil
-from onespp.denoise.temporal import Temporal
+from onespp.denoise.methods.temporal import Temporal
 
 from .synthetic import make_frame, translation, turn, with_images
 

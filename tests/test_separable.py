@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from onespp.denoise import oracles
-from onespp.denoise.separable import BilateralSeparable
+from onespp.denoise.methods.separable import BilateralSeparable
 
 from .kernels import compiled, taking_turns
 from .synthetic import make_frame, noisy

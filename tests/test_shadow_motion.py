@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onespp.denoise.filtered_innovation import FilteredInnovation
 from onespp.denoise.history.shadow_motion import read_shadow_rays, shadow_motion
 from onespp.denoise.inputs.surface import read_surface
 from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
 from onespp.render.channels import FRAME, SHADOW, SPLIT
 from onespp.render.errors import InputError
 from onespp.render.tracer.renderer import Renderer

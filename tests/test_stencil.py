@@ -8,15 +8,15 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from onespp.denoise.assignment import Assignment, AssignmentAtrous
-from onespp.denoise.atrous import Atrous
-from onespp.denoise.bilateral import Bilateral
 from onespp.denoise.history.reprojection import load_table
 from onespp.denoise.jit.fastmath import exp2
 from onespp.denoise.jit.grid import Stencil, Step, Taps
 from onespp.denoise.jit.structure import build, evaluate, flatten
+from onespp.denoise.methods.assignment import Assignment, AssignmentAtrous
+from onespp.denoise.methods.atrous import Atrous
+from onespp.denoise.methods.bilateral import Bilateral
+from onespp.denoise.methods.temporal import Temporal
 from onespp.denoise.run.timed import timed
-from onespp.denoise.temporal import Temporal
 from onespp.render.errors import InputError
 
 from .kernels import compiled

@@ -6,8 +6,8 @@ import time
 import numpy as np
 import pytest
 
+from onespp.denoise.methods.temporal import Temporal
 from onespp.denoise.run.sequence import ALONE, Pace, denoise_sequence
-from onespp.denoise.temporal import Temporal
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest
 from onespp.render.files.sequence import Sequence

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from onespp.denoise.history.records import WORDS
-from onespp.denoise.svgf import Svgf
+from onespp.denoise.methods.svgf import Svgf
 from onespp.render.errors import InputError
 from tests import svgf_oracle
 

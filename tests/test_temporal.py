@@ -6,7 +6,7 @@ from onespp.denoise import oracles
 from onespp.denoise.filters.color_box import RowPass, window_moments
 from onespp.denoise.jit.arrays import Color
 from onespp.denoise.jit.grid import Stencil
-from onespp.denoise.temporal import Temporal
+from onespp.denoise.methods.temporal import Temporal
 from onespp.render.errors import InputError
 
 from .kernels import compiled, taking_turns

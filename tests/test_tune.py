@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from onespp.denoise.methods import build
+from onespp.denoise.catalog import build
 from onespp.denoise.metrics.tonemap import srgb_from_linear
 from onespp.denoise.studies.tune import Case, Search, mean_psnr, neighbours, starting_point
 from onespp.render.channels import FRAME

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
-from onespp.denoise.parameters import pairs
+from onespp.denoise.methods.parameters import pairs
 from onespp.render.channels import REPLAY, SPLIT
 from onespp.render.cli.render import device_option, threads_option, use
 from onespp.render.cli.terminal import command_line, note, progress
@@ -63,7 +63,7 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
                name: str | None = None, outliers: float | None = None,
                default: bool = False) -> None:
     """Do what the options of `denoise` ask; `default`: nobody chose the methods."""
-    from onespp.denoise.methods import OUTLIERS, build
+    from onespp.denoise.catalog import OUTLIERS, build
     from onespp.denoise.run.sequence import denoise_sequence
 
     sequence = Sequence.open(folder)
@@ -145,7 +145,7 @@ def time_(folder: Path, methods: tuple[str, ...], frames: int, rounds: int, devi
           threads: int | None) -> None:
     """Time methods in turns on the sequence in FOLDER; `score` then uses these times."""
     use(device, threads)
-    from onespp.denoise.methods import build
+    from onespp.denoise.catalog import build
     from onespp.denoise.run.interleaved_timing import time_methods
 
     sequence = Sequence.open(folder)
@@ -162,7 +162,7 @@ def time_(folder: Path, methods: tuple[str, ...], frames: int, rounds: int, devi
 
 def _names(methods: tuple[str, ...]) -> list[str]:
     """The methods meant, `all` and `oidn` replaced by what they stand for."""
-    from onespp.denoise.methods import METHODS
+    from onespp.denoise.catalog import METHODS
     from onespp.denoise.oidn import QUALITIES
     from onespp.denoise.peers import PEERS
 
@@ -172,7 +172,7 @@ def _names(methods: tuple[str, ...]) -> list[str]:
 
 
 def _list(context: click.Context) -> None:
-    from onespp.denoise.methods import METHODS, build, parameters
+    from onespp.denoise.catalog import METHODS, build, parameters
     from onespp.denoise.peers import PEERS
 
     about = {name: (method.__doc__ or "").splitlines()[0] for name, method in METHODS.items()}

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
+from onespp.denoise.methods.parameters import pairs, renamed_parameters, with_present_names
 from onespp.denoise.metrics.tonemap import TONE_MAP
-from onespp.denoise.parameters import pairs, renamed_parameters, with_present_names
 from onespp.render.cli.render import device_option, threads_option, use
 from onespp.render.cli.terminal import note, progress
 from onespp.render.errors import InputError
@@ -33,7 +33,7 @@ def tune(folders: tuple[Path, ...], method: str, names: tuple[str, ...],
     Give other frames and seeds than those that you report scores of.
     """
     use(device, threads)
-    from onespp.denoise.methods import build
+    from onespp.denoise.catalog import build
     from onespp.denoise.studies.tune import FACTORS, Search, read_case, starting_point
 
     start = starting_point(method, pairs(settings), note)

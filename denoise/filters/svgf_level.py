@@ -22,11 +22,11 @@ from typing import NamedTuple
 
 import drjit as dr
 
-from onespp.denoise.atrous import LOG2E, SPLINE, LuminanceColor, LuminanceWeight, NoisyColor
 from onespp.denoise.inputs.surface import Surface
 from onespp.denoise.jit.arrays import Float, Vector3
 from onespp.denoise.jit.fastmath import exp2
 from onespp.denoise.jit.grid import Stencil, Taps, window
+from onespp.denoise.methods.atrous import LOG2E, SPLINE, LuminanceColor, LuminanceWeight, NoisyColor
 
 EPSILON_DEPTH = 1e-3
 _BACKGROUND = 1e20   # depth where there is no surface: far from any, so that its weight is 0

@@ -23,10 +23,10 @@ from typing import NamedTuple
 import drjit as dr
 import numpy as np
 
-from onespp.denoise.atrous import LuminanceColor, with_green
 from onespp.denoise.jit.arrays import Color, Float
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import arrays_of
+from onespp.denoise.methods.atrous import LuminanceColor, with_green
 from onespp.render.frame import Frame
 
 from .demodulation import Texture, read_texture

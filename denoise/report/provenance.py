@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from onespp.denoise.parameters import present_parameters
+from onespp.denoise.methods.parameters import present_parameters
 from onespp.denoise.score.scorecard import INPUT, Scores
 from onespp.render.files.manifest import Run
 from onespp.render.files.sequence import Sequence

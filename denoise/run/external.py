@@ -14,7 +14,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from onespp.denoise.methods import check_not_a_method
+from onespp.denoise.catalog import check_not_a_method
 from onespp.render.cli.terminal import readable
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Run, check_result_name

@@ -13,7 +13,7 @@ from functools import partial
 import drjit as dr
 import numpy as np
 
-from onespp.denoise.methods import Method, channels_read, parameters
+from onespp.denoise.catalog import Method, channels_read, parameters
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
 from onespp.render.files.json_file import format_json

@@ -18,7 +18,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from onespp.denoise.methods import (
+from onespp.denoise.catalog import (
     Method,
     changed,
     channels_read,
@@ -26,8 +26,8 @@ from onespp.denoise.methods import (
     name_of,
     parameters,
 )
-from onespp.denoise.outliers import energy_kept
-from onespp.denoise.parameters import present_parameters
+from onespp.denoise.methods.outliers import energy_kept
+from onespp.denoise.methods.parameters import present_parameters
 from onespp.render.files.manifest import Run, check_result_name
 from onespp.render.files.sequence import Sequence
 from onespp.render.frame import Frame

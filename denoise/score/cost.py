@@ -5,7 +5,7 @@ from __future__ import annotations
 from statistics import median
 from typing import Any
 
-from onespp.denoise.parameters import present_parameters
+from onespp.denoise.methods.parameters import present_parameters
 from onespp.render.files.manifest import Run
 from onespp.render.files.sequence import Sequence
 from onespp.render.files.times import Times

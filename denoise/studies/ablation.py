@@ -14,7 +14,7 @@ from typing import Any
 
 import click
 
-from onespp.denoise.methods import Method, build, channels_read, parameters
+from onespp.denoise.catalog import Method, build, channels_read, parameters
 from onespp.denoise.metrics.flicker import MEASURES
 from onespp.denoise.metrics.means import mean_over_frames
 from onespp.denoise.metrics.tonemap import TONE_MAP

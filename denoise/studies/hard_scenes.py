@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from onespp.denoise.methods import METHODS, Method
+from onespp.denoise.catalog import METHODS, Method
 from onespp.denoise.metrics.table import measure_pair, non_finite, pair, reference_floor
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence as Folder

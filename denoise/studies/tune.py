@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from onespp.denoise.methods import Method, build, channels_read, parameters
+from onespp.denoise.catalog import Method, build, channels_read, parameters
+from onespp.denoise.methods.parameters import present_parameters
 from onespp.denoise.metrics.means import mean_decibels
 from onespp.denoise.metrics.table import psnr
 from onespp.denoise.metrics.tonemap import srgb_from_linear
-from onespp.denoise.parameters import present_parameters
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
 from onespp.render.files.sequence import Sequence

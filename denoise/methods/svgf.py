@@ -56,8 +56,9 @@ from .atrous import (
     with_green,
     with_luminance,
 )
-from .lanes import OnLanes
-from .moments import (
+from .base import OnLanes
+from .parameters import HISTORY_RENAMED, check_positive, check_range, check_whole
+from .svgf_accumulation import (
     SHORT,
     Accumulated,
     AccumulationWeights,
@@ -65,7 +66,6 @@ from .moments import (
     estimate_variances,
     tabulate_moments,
 )
-from .parameters import HISTORY_RENAMED, check_positive, check_range, check_whole
 
 SIGNALS = ("direct", "indirect")
 _VARIANCE = 3  # which plane of a `NoisyColor`

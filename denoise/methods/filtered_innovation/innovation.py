@@ -64,9 +64,9 @@ from onespp.denoise.jit.fastmath import exp2
 from onespp.denoise.jit.grid import Offset, Stencil, Taps, window
 from onespp.denoise.jit.masked import tabulate, weighted_sums, window_taps
 from onespp.denoise.jit.structure import mapped
+from onespp.denoise.methods.atrous import EPSILON, LOG2E
 
-from .atrous import EPSILON, LOG2E
-from .signal_layout import History, NoisySignal, PlaneRule, SignalLayout, Smoothed
+from .layout import History, NoisySignal, PlaneRule, SignalLayout, Smoothed
 
 BINOMIAL = {0: 1 / 2, 1: 1 / 4}
 MIN_NOISE = 0.25               # share of the innovation's energy that is at least noise of d

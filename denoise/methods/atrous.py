@@ -45,7 +45,7 @@ from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, single, window
 from onespp.denoise.jit.structure import evaluate
 from onespp.render.frame import Frame
 
-from .lanes import OnLanes
+from .base import OnLanes
 from .parameters import check_positive, check_whole
 
 LOG2E = 1.4426950408889634

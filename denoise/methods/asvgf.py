@@ -34,7 +34,7 @@ from onespp.render.channels import REPLAY
 from onespp.render.frame import Frame
 
 from .atrous import LARGEST_LEVELS, SPLINE
-from .lanes import OnLanes
+from .base import OnLanes
 from .parameters import check_positive, check_range, check_whole
 from .svgf import Passes, Svgf
 

@@ -20,20 +20,20 @@ from typing import Any, Protocol
 import numpy as np
 
 from onespp.denoise.inputs.demodulation import CHANNELS as TEXTURE
+from onespp.denoise.methods.assignment import Assignment, AssignmentAtrous
+from onespp.denoise.methods.asvgf import Asvgf
+from onespp.denoise.methods.atrous import Atrous
+from onespp.denoise.methods.bilateral import Bilateral
+from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
+from onespp.denoise.methods.outliers import RemoveOutliers, WithoutOutliers
+from onespp.denoise.methods.parameters import renamed_parameters, with_present_names
+from onespp.denoise.methods.separable import BilateralSeparable
+from onespp.denoise.methods.svgf import Svgf
+from onespp.denoise.methods.temporal import Temporal
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 
-from .assignment import Assignment, AssignmentAtrous
-from .asvgf import Asvgf
-from .atrous import Atrous
-from .bilateral import Bilateral
-from .filtered_innovation import FilteredInnovation
-from .outliers import RemoveOutliers, WithoutOutliers
-from .parameters import renamed_parameters, with_present_names
 from .peers import PEERS
-from .separable import BilateralSeparable
-from .svgf import Svgf
-from .temporal import Temporal
 
 OUTLIERS = "+outliers"
 """Ends the name of a method before which outliers are removed."""

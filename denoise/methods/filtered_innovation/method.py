@@ -32,10 +32,17 @@ from onespp.denoise.inputs.surface import Surface, SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Bool, Color, Float, Vector3
 from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, window
 from onespp.denoise.jit.structure import arrays_of, build, evaluate, flatten
+from onespp.denoise.methods.atrous import BACKGROUND, LARGEST_LEVELS, LOG2E
+from onespp.denoise.methods.base import OnLanes
+from onespp.denoise.methods.parameters import (
+    INNOVATION_RENAMED,
+    check_positive,
+    check_range,
+    check_whole,
+)
 from onespp.render.channels import SHADOW
 from onespp.render.frame import Frame
 
-from .atrous import BACKGROUND, LARGEST_LEVELS, LOG2E
 from .innovation import (
     Gains,
     Innovations,
@@ -49,9 +56,7 @@ from .innovation import (
     smooth_level,
     to_smooth,
 )
-from .lanes import OnLanes
-from .parameters import INNOVATION_RENAMED, check_positive, check_range, check_whole
-from .signal_layout import ENERGY_LEVELS, History, PlaneRule, SignalLayout, Smoothed
+from .layout import ENERGY_LEVELS, History, PlaneRule, SignalLayout, Smoothed
 
 _OUTSIDE = -1e15          # 1/z outside the image
 _BLACK = 2 * BACKGROUND   # 1/z of a surface that reflects nothing: a lamp

@@ -18,8 +18,8 @@ from onespp.denoise.jit.grid import Stencil
 from onespp.render.frame import Frame
 
 from .atrous import Atrous, AtrousState
+from .base import OnLanes, State
 from .bilateral import Bilateral, BilateralState
-from .lanes import OnLanes, State
 from .temporal import Temporal, TemporalState
 
 

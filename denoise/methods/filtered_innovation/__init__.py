@@ -1,0 +1,1 @@
+"""Our method, `onespp`: the filtered innovation."""
