@@ -30,10 +30,9 @@ from onespp.denoise.methods.parameters import renamed_parameters, with_present_n
 from onespp.denoise.methods.separable import BilateralSeparable
 from onespp.denoise.methods.svgf import Svgf
 from onespp.denoise.methods.temporal import Temporal
+from onespp.denoise.peers.table import PEERS
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
-
-from .peers import PEERS
 
 OUTLIERS = "+outliers"
 """Ends the name of a method before which outliers are removed."""

@@ -24,7 +24,7 @@ from onespp import app
 from onespp.denoise.catalog import METHODS, build
 from onespp.denoise.methods.outliers import RemoveOutliers
 from onespp.denoise.metrics.flicker import MEASURES
-from onespp.denoise.peers import PEERS
+from onespp.denoise.peers.table import PEERS
 from onespp.denoise.score.causes import CAUSES, HISTORIES
 from onespp.render.channels import CHANNELS
 from onespp.scenes import catalog

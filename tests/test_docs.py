@@ -28,7 +28,7 @@ from onespp.denoise.methods.outliers import RemoveOutliers
 from onespp.denoise.methods.parameters import pairs
 from onespp.denoise.metrics.flicker import MEASURES
 from onespp.denoise.metrics.tonemap import srgb_from_linear
-from onespp.denoise.peers import PEERS
+from onespp.denoise.peers.table import PEERS
 from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from onespp.denoise.catalog import build
-from onespp.denoise.peers import PEERS
+from onespp.denoise.peers.table import PEERS
 from onespp.denoise.report.html import write_report
 from onespp.denoise.report.terminal import caption
 from onespp.denoise.score.sequence import score

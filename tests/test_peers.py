@@ -8,9 +8,9 @@ import sys
 import numpy as np
 import pytest
 
-from onespp.denoise import oidn
 from onespp.denoise.catalog import METHODS, build, parameters
-from onespp.denoise.peers import PEERS
+from onespp.denoise.peers import oidn
+from onespp.denoise.peers.table import PEERS
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.host import backend

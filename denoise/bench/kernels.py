@@ -26,7 +26,7 @@ import numpy as np
 from onespp.denoise import oracles
 from onespp.denoise.catalog import build
 from onespp.denoise.inputs.surface import read_color, read_surface
-from onespp.denoise.oidn import AVAILABLE, Oidn
+from onespp.denoise.peers.oidn import AVAILABLE, Oidn
 from onespp.denoise.run.timed import timed
 from onespp.render.frame import Frame
 from onespp.render.host import backend

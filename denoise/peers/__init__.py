@@ -1,0 +1,1 @@
+"""Denoisers of others, as methods beside ours."""
