@@ -11,10 +11,10 @@ from itertools import pairwise
 import numpy as np
 
 import onespp  # noqa: F401 - finds LLVM before anything imports Dr.Jit
-from onespp.denoise import oracles
 from onespp.denoise.catalog import METHODS, build, parameters
 from onespp.denoise.inputs.surface import GUIDES
 from onespp.denoise.methods.temporal import Temporal
+from onespp.denoise.oracles import filters as oracles
 from onespp.render.frame import Frame
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.hard import HARD

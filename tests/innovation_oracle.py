@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from onespp.denoise import oracles
-from onespp.denoise.oracles import (
+from onespp.denoise.oracles import filters as oracles
+from onespp.denoise.oracles.filters import (
     Pixels,
     luminance,
     pairs,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from onespp.denoise import oracles
-from onespp.denoise.oracles import Pixels, blur3x3, luminance, pairs
+from onespp.denoise.oracles import filters as oracles
+from onespp.denoise.oracles.filters import Pixels, blur3x3, luminance, pairs
 from onespp.render.frame import Frame
 
 

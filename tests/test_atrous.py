@@ -2,9 +2,9 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from onespp.denoise import oracles
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.methods.atrous import Atrous, estimate_variance
+from onespp.denoise.oracles import filters as oracles
 from onespp.render.errors import InputError
 
 from .kernels import compiled, taking_turns

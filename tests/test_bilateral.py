@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from onespp.denoise import oracles
 from onespp.denoise.methods.bilateral import ACOS2, Bilateral
+from onespp.denoise.oracles import filters as oracles
 from onespp.render.errors import InputError
 
 from .kernels import compiled, taking_turns

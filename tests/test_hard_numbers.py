@@ -8,12 +8,12 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from onespp.denoise import oracles
 from onespp.denoise.catalog import METHODS, build, parameters
 from onespp.denoise.filters.color_box import RowPass, window_moments
 from onespp.denoise.inputs.surface import repair
 from onespp.denoise.jit.arrays import Color
 from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.oracles import filters as oracles
 from onespp.render.channels import REPLAY
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.hard import HARD

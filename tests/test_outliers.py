@@ -5,7 +5,7 @@ import pytest
 
 from onespp.denoise.catalog import build, channels_read, parameters
 from onespp.denoise.methods.outliers import FEWEST, RemoveOutliers, energy_kept
-from onespp.denoise.oracles import pairs, plane_weight_distance, read
+from onespp.denoise.oracles.filters import pairs, plane_weight_distance, read
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest
 from onespp.render.files.sequence import Sequence

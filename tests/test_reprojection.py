@@ -4,11 +4,11 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from onespp.denoise import oracles
 from onespp.denoise.history.reprojection import locate, motion_between, motion_table
 from onespp.denoise.inputs.surface import read_surface
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.methods.temporal import Temporal
+from onespp.denoise.oracles import filters as oracles
 
 from .synthetic import make_frame, translation, turn, with_images
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from onespp.denoise import oracles
 from onespp.denoise.methods.separable import BilateralSeparable
+from onespp.denoise.oracles import filters as oracles
 
 from .kernels import compiled, taking_turns
 from .synthetic import make_frame, noisy

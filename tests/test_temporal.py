@@ -2,11 +2,11 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from onespp.denoise import oracles
 from onespp.denoise.filters.color_box import RowPass, window_moments
 from onespp.denoise.jit.arrays import Color
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.methods.temporal import Temporal
+from onespp.denoise.oracles import filters as oracles
 from onespp.render.errors import InputError
 
 from .kernels import compiled, taking_turns

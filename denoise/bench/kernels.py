@@ -23,9 +23,9 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from onespp.denoise import oracles
 from onespp.denoise.catalog import build
 from onespp.denoise.inputs.surface import read_color, read_surface
+from onespp.denoise.oracles import filters as oracles
 from onespp.denoise.peers.oidn import AVAILABLE, Oidn
 from onespp.denoise.run.timed import timed
 from onespp.render.frame import Frame
