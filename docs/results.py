@@ -43,8 +43,8 @@ from onespp.render.cli.arguments import parse_size
 from onespp.render.cli.render import use
 from onespp.render.cli.terminal import run as run_command
 from onespp.render.errors import InputError
+from onespp.render.files.frame_ranges import format_frames, parse_frames
 from onespp.render.files.lock import writing
-from onespp.render.files.manifest import format_frames, parse_frames
 from onespp.render.files.sequence import Sequence as FrameSequence
 from onespp.render.files.times import read_times
 from onespp.render.job import RenderJob, render_sequence

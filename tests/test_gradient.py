@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from onespp.render.channels import FRAME, REPLAY
-from onespp.render.files.manifest import parse_frames
+from onespp.render.files.frame_ranges import parse_frames
 from onespp.render.job import RenderJob, render_sequence
 from onespp.render.tracer.renderer import Renderer
 from onespp.render.tracer.replay import replay

@@ -13,7 +13,8 @@ from hypothesis.extra.numpy import arrays
 
 from onespp.render.errors import InputError
 from onespp.render.files.exr import read_header
-from onespp.render.files.manifest import Manifest, Run, format_frames, parse_frames
+from onespp.render.files.frame_ranges import format_frames, parse_frames
+from onespp.render.files.manifest import Manifest, Run
 from onespp.render.files.matrices import format_matrices, read_matrices
 from onespp.render.files.sequence import Reference, Sequence
 from onespp.render.frame import Frame

@@ -29,7 +29,7 @@ from onespp.denoise.report.contact_sheets import Progress, draw_pictures
 from onespp.denoise.report.provenance import commands
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
-from onespp.render.files.manifest import format_frames
+from onespp.render.files.frame_ranges import format_frames
 from onespp.render.files.sequence import Reference, Sequence
 from onespp.render.files.times import read_times
 

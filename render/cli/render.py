@@ -9,8 +9,8 @@ import click
 
 from onespp.render.channels import FRAME, GLOSS, REPLAY, SHADOW, SPLIT
 from onespp.render.errors import InputError
+from onespp.render.files.frame_ranges import parse_frames
 from onespp.render.files.lock import writing
-from onespp.render.files.manifest import parse_frames
 from onespp.render.files.sequence import Sequence
 from onespp.render.host import backend
 from onespp.render.host.memory import require_memory

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from itertools import pairwise
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
@@ -21,45 +20,10 @@ from pydantic import (
 from onespp.render.channels import CHANNELS
 from onespp.render.errors import InputError
 
+from .frame_ranges import format_frames, parse_frames
 from .json_file import JsonFile
 
 FORMAT = 1
-_MOST_FRAMES = 100_000
-
-
-def parse_frames(text: str) -> tuple[int, ...]:
-    """Frame numbers of '0:20' (0 to 19), '0:20:2', '5', or several of these with commas.
-
-    Raises:
-        InputError: not of this form, negative, none, or not in increasing order.
-    """
-    numbers: list[int] = []
-    for part in text.split(","):
-        match = re.fullmatch(r"\s*([0-9]{1,9})(?::([0-9]{1,9})(?::([1-9][0-9]{0,8}))?)?\s*", part)
-        if not match:
-            raise InputError(f"{text[:40]!r} are not frames: write 0:20 for 0 to 19, or 3,5,8")
-        start, stop, step = match.groups()
-        part_numbers = range(int(start), int(start) + 1 if stop is None else int(stop),
-                             int(step or 1))
-        if len(part_numbers) + len(numbers) > _MOST_FRAMES:
-            raise InputError(f"the frames {text[:40]!r} are more than {_MOST_FRAMES}")
-        numbers += part_numbers
-    if not numbers:
-        raise InputError(f"the frames {text[:40]!r} are none: write 0:20 for 0 to 19")
-    if any(b <= a for a, b in pairwise(numbers)):
-        raise InputError(f"the frames {text[:40]!r} are not in increasing order")
-    return tuple(numbers)
-
-
-def format_frames(frames: Iterable[int]) -> str:
-    """The shortest text that `parse_frames` reads as these increasing numbers."""
-    runs: list[list[int]] = []
-    for i in frames:
-        if runs and runs[-1][-1] == i - 1:
-            runs[-1].append(i)
-        else:
-            runs.append([i])
-    return ",".join(f"{r[0]}:{r[-1] + 1}" if len(r) > 1 else str(r[0]) for r in runs)
 
 
 def _frames(value: Any) -> tuple[int, ...]:

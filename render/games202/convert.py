@@ -34,8 +34,9 @@ import numpy as np
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import all_or_none, read_bytes, write_bytes
 from onespp.render.files.exr import read_exr, read_header, write_exr
+from onespp.render.files.frame_ranges import format_frames
 from onespp.render.files.json_file import checked
-from onespp.render.files.manifest import Manifest, Run, check_result_name, format_frames
+from onespp.render.files.manifest import Manifest, Run, check_result_name
 from onespp.render.files.sequence import Reference, Sequence, object_ids
 from onespp.render.frame import Frame
 
