@@ -19,6 +19,8 @@ from pathlib import Path
 
 from onespp.render.errors import InputError
 
+from .cuda_driver import has_cuda
+
 OLDEST_LLVM = 16
 _SET_BY_USER = os.environ.get("DRJIT_LIBLLVM_PATH") or None
 _ADVICE = ("install one with `pip install karellen-llvm-core` (Linux x86-64) or your system's "
@@ -143,20 +145,6 @@ def require_llvm() -> LLVM:
         raise InputError(f"the LLVM at {llvm.path} is older than {OLDEST_LLVM} or cannot be "
                          f"loaded, and Dr.Jit would crash with it: {_ADVICE}")
     return llvm
-
-
-def has_cuda() -> bool:
-    """Whether there is a CUDA driver with a device.
-
-    Asks the driver itself: Dr.Jit would load LLVM first, and complain about a wrong one.
-    """
-    try:
-        driver = ctypes.CDLL("nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1")
-    except OSError:
-        return False
-    count = ctypes.c_int()
-    return (driver.cuInit(0) == 0 and driver.cuDeviceGetCount(ctypes.byref(count)) == 0
-            and count.value > 0)
 
 
 @cache
