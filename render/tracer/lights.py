@@ -31,7 +31,6 @@ import drjit as dr
 
 from onespp.render.mitsuba.variant import mi
 
-from .mis import power_heuristic
 from .sampler import Sampler
 
 GRID = 4
@@ -118,3 +117,12 @@ def contribution(scene: mi.Scene, si: mi.SurfaceInteraction3f, k: mi.UInt32, pla
     value = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(light.d), active)
     c = dr.select(active & (light.pdf > 0), value * weight, 0) / (GRID * GRID)
     return c, light
+
+
+def power_heuristic(p: mi.Float, q: mi.Float) -> mi.Float:
+    """Power heuristic weight of a sample drawn with density p where q could have drawn it too.
+
+    Source: Veach 1997, section 9.2.2, exponent 2. Infinite or zero densities give 1 or 0.
+    """
+    w = dr.square(p) / (dr.square(p) + dr.square(q))
+    return dr.select(p > 0, dr.select(dr.isfinite(w), w, 1), 0)

@@ -19,8 +19,7 @@ import drjit as dr
 
 from onespp.render.mitsuba.variant import mi
 
-from .lights import DirectLight, resample_lights, shape_index
-from .mis import power_heuristic
+from .lights import DirectLight, power_heuristic, resample_lights, shape_index
 from .sampler import Sampler
 
 
