@@ -40,7 +40,7 @@ from onespp.denoise.studies.ablation import markdown as ablation_table
 from onespp.denoise.studies.lead import markdown as lead_table
 from onespp.render.channels import REPLAY
 from onespp.render.cli.arguments import parse_size
-from onespp.render.cli.render import use
+from onespp.render.cli.options import use
 from onespp.render.cli.terminal import run as run_command
 from onespp.render.errors import InputError
 from onespp.render.files.frame_ranges import format_frames, parse_frames

@@ -53,8 +53,8 @@ def scenes() -> None:
               show_default=True, help="Folder of the sequences.")
 @click.option("--reference-spp", type=int, default=REFERENCE_SPP, show_default=True, metavar="N",
               help="Samples a pixel of the ground truth.")
-@onespp.render.cli.render.device_option
-@onespp.render.cli.render.threads_option
+@onespp.render.cli.options.device_option
+@onespp.render.cli.options.threads_option
 def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
          threads: int | None) -> None:
     """Try every method on hard scenes (all, or those named), and print a table in Markdown.
@@ -62,7 +62,7 @@ def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
     Renders what is missing. For each scene and method: error, what its history gains, how soon it
     recovers from a sudden change, and whether it keeps the energy.
     """
-    onespp.render.cli.render.use(device, threads)
+    onespp.render.cli.options.use(device, threads)
     from onespp.denoise.studies.hard_scenes import markdown
     from onespp.scenes.hard import HARD
 
@@ -111,12 +111,12 @@ def _within(steps: Steps, number: int, name: str, part: float) -> None:
               help="Folder of the sequence; default data/SCENE.")
 @click.option("--method", "methods", multiple=True, metavar="NAME", default=DEFAULT_METHODS,
               show_default=True, help="As for `denoise`; may be given several times.")
-@onespp.render.cli.render.render_options
+@onespp.render.cli.options.render_options
 @click.pass_context
 def run(context: click.Context, scene: str, out: Path | None, methods: tuple[str, ...],
         device: str, threads: int | None, reference_spp: int | None, **options) -> None:
     """Render SCENE with ground truth, denoise it and score the result."""
-    onespp.render.cli.render.use(device, threads)
+    onespp.render.cli.options.use(device, threads)
     spp = REFERENCE_SPP if reference_spp is None else reference_spp
     sequence = onespp.render.cli.render.render_to(scene, out, reference_spp=spp, **options)
     default = context.get_parameter_source("methods") == ParameterSource.DEFAULT

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from onespp.render.cli.arguments import parse_size
-from onespp.render.cli.render import device_option, threads_option, use
+from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import progress
 
 from .options import json_option, show_or_print

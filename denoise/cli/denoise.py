@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from onespp.denoise.methods.parameters import pairs
 from onespp.render.channels import REPLAY, SPLIT
-from onespp.render.cli.render import device_option, threads_option, use
+from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import command_line, note, progress
 from onespp.render.errors import InputError
 from onespp.render.files.lock import writing

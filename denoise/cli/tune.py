@@ -8,7 +8,7 @@ import click
 
 from onespp.denoise.methods.parameters import pairs, renamed_parameters, with_present_names
 from onespp.denoise.metrics.tonemap import TONE_MAP
-from onespp.render.cli.render import device_option, threads_option, use
+from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import note, progress
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence

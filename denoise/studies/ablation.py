@@ -20,7 +20,7 @@ from onespp.denoise.metrics.means import mean_over_frames
 from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.denoise.score.frame_truth import read_ground
 from onespp.denoise.score.scorer import Judge
-from onespp.render.cli.render import device_option, threads_option, use
+from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import progress, run
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence

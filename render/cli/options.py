@@ -1,0 +1,59 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import os
+
+import click
+
+from onespp.render.channels import FRAME, GLOSS, REPLAY, SHADOW, SPLIT
+from onespp.render.host import backend
+
+
+def use(device: str, threads: int | None) -> None:
+    """Fix the device and the number of threads. Call before anything imports Mitsuba."""
+    chosen = backend.choose(device)
+    if device != "auto":
+        os.environ["ONESPP_DEVICE"] = chosen
+    backend.set_threads(threads)
+
+
+device_option = click.option("--device", default="auto", show_default=True, metavar="DEVICE",
+                             help="Where kernels run: auto, llvm (CPU) or cuda.")
+threads_option = click.option("--threads", type=int, metavar="N", help="CPU threads; default all.")
+frames_option = click.option("--frames", metavar="RANGE",
+                             help="As 0:20 (0 to 19), 0:20:2, 7 or 0,5,9; default all.")
+overwrite_option = click.option(
+    "--overwrite/--resume", default=False,
+    help="Replace another sequence in the folder, or go on with the same one where it stopped; "
+         "default resume.")
+OFFERED = (*FRAME, *SPLIT, *SHADOW, *GLOSS, *REPLAY)
+
+
+def render_options(command):
+    """Options of every command that renders."""
+    for option in reversed((
+        frames_option,
+        click.option("--size", metavar="WxH", help="Pixels, as 640x360; default the scene's."),
+        click.option("--seed", default=0, show_default=True, metavar="N",
+                     help="Seed of all random numbers."),
+        click.option("--reference-spp", type=int, metavar="N",
+                     help="Also render ground truth with N samples a pixel; what is there "
+                          "with more is kept."),
+        click.option("--antialias", is_flag=True,
+                     help="Box-filter the reference over each pixel instead of its centre."),
+        click.option("--channels", metavar="NAMES",
+                     help=f"What frames carry, of {', '.join(OFFERED)}; default those that "
+                          "say something about the scene; +NAMES: beside those, as +gradient for "
+                          f"{' and '.join(REPLAY)}."),
+        click.option("--direct", default="resampled", show_default=True,
+                     type=click.Choice(["mis", "resampled"]),
+                     help="Direct light at the first hit: as Mitsuba's path, or by resampling all "
+                          "lights, split into unshadowed light and visibility."),
+        click.option("--sampler", default="zsobol", show_default=True,
+                     type=click.Choice(["pcg", "zsobol", "bluenoise"]),
+                     help="Random numbers: independent, or with blue-noise error (two kinds)."),
+        overwrite_option, device_option, threads_option,
+    )):
+        command = option(command)
+    return command
