@@ -37,24 +37,3 @@ def screen_from_camera(frame: Frame) -> np.ndarray:
     except np.linalg.LinAlgError:
         raise InputError(f"camera_from_world of frame {frame.index} is singular") from None
     return (frame.screen_from_world @ world_from_camera)[[0, 1, 3], :3]
-
-
-def world_motions(previous: Frame, current: Frame) -> np.ndarray:
-    """(objects, 4, 4) M' M^-1, exactly the identity for an object at rest; NaN for one that only
-    one of the frames has, or whose M has changed and cannot be inverted."""
-    before = np.full(current.world_from_object.shape, np.nan)
-    count = min(len(before), len(previous.world_from_object))
-    before[:count] = previous.world_from_object[:count]
-    motion = before @ inverses(current.world_from_object)
-    motion[(before == current.world_from_object).all((1, 2))] = np.eye(4)
-    return motion
-
-
-def inverses(matrices: np.ndarray) -> np.ndarray:
-    """(n, k, k) inverses, NaN where there is none."""
-    try:
-        return np.linalg.inv(matrices)
-    except np.linalg.LinAlgError:
-        if len(matrices) == 1:
-            return np.full(matrices.shape, np.nan)
-        return np.concatenate([inverses(matrix[None]) for matrix in matrices])

@@ -17,7 +17,8 @@ import numpy as np
 
 from onespp.render.frame import Frame
 
-from .cameras import camera_from_screen, world_motions
+from .cameras import camera_from_screen
+from .motion import world_motions
 
 GUIDES = ("normal", "depth", "id")
 MIN_COSINE, PLANE_TOLERANCE = 0.9, 0.02

@@ -27,7 +27,8 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.filters.penumbra import PenumbraSample, light_sizes, penumbra_samples
-from onespp.denoise.geometry.cameras import inverses, screen_from_camera, world_motions
+from onespp.denoise.geometry.cameras import screen_from_camera
+from onespp.denoise.geometry.motion import inverses, world_motions
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane, dot, opaque_matrix, transform
 from onespp.denoise.jit.arrays import Bool, Float, Matrix3, Vector3
 from onespp.denoise.jit.grid import Stencil

@@ -1,0 +1,28 @@
+"""How objects moved between two frames, float64."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from onespp.render.frame import Frame
+
+
+def world_motions(previous: Frame, current: Frame) -> np.ndarray:
+    """(objects, 4, 4) M' M^-1, exactly the identity for an object at rest; NaN for one that only
+    one of the frames has, or whose M has changed and cannot be inverted."""
+    before = np.full(current.world_from_object.shape, np.nan)
+    count = min(len(before), len(previous.world_from_object))
+    before[:count] = previous.world_from_object[:count]
+    motion = before @ inverses(current.world_from_object)
+    motion[(before == current.world_from_object).all((1, 2))] = np.eye(4)
+    return motion
+
+
+def inverses(matrices: np.ndarray) -> np.ndarray:
+    """(n, k, k) inverses, NaN where there is none."""
+    try:
+        return np.linalg.inv(matrices)
+    except np.linalg.LinAlgError:
+        if len(matrices) == 1:
+            return np.full(matrices.shape, np.nan)
+        return np.concatenate([inverses(matrix[None]) for matrix in matrices])
