@@ -10,7 +10,7 @@ import pytest
 
 from onespp.denoise.catalog import METHODS, build, parameters
 from onespp.denoise.filters.color_box import RowPass, window_moments
-from onespp.denoise.inputs.surface import repair
+from onespp.denoise.inputs.repair import repair
 from onespp.denoise.jit.arrays import Color
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.oracles import filters as oracles

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from onespp.denoise.inputs.color import read_color
 from onespp.denoise.inputs.signals import USED, read_signals
-from onespp.denoise.inputs.surface import read_color
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.methods import base as lanes
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation

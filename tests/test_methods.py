@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from onespp.denoise.catalog import METHODS, build, parameters
-from onespp.denoise.inputs.surface import repair
+from onespp.denoise.inputs.repair import repair
 from onespp.denoise.run.timed import timed
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame

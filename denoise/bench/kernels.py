@@ -24,7 +24,8 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.catalog import build
-from onespp.denoise.inputs.surface import read_color, read_surface
+from onespp.denoise.inputs.color import read_color
+from onespp.denoise.inputs.surface import read_surface
 from onespp.denoise.oracles import filters as oracles
 from onespp.denoise.peers.oidn import AVAILABLE, Oidn
 from onespp.denoise.run.timed import timed

@@ -30,7 +30,8 @@ from onespp.denoise.methods.atrous import LuminanceColor, with_green
 from onespp.render.frame import Frame
 
 from .demodulation import Texture, read_texture
-from .surface import luminance, repair
+from .repair import repair
+from .surface import luminance
 
 USED = ("direct", "indirect", "unshadowed", "visibility", "specular")
 LARGEST_VISIBILITY = 2.0

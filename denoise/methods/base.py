@@ -7,7 +7,8 @@ from typing import ClassVar, Generic, Protocol, TypeVar
 import numpy as np
 
 from onespp.denoise.filters.debts import repay
-from onespp.denoise.inputs.surface import GUIDES, Surface, read_color, read_surface
+from onespp.denoise.inputs.color import read_color
+from onespp.denoise.inputs.surface import GUIDES, Surface, read_surface
 from onespp.denoise.jit.arrays import Color
 from onespp.denoise.jit.grid import Stencil
 from onespp.render.frame import Frame

@@ -28,7 +28,8 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.inputs.demodulation import Texture, read_texture
-from onespp.denoise.inputs.surface import GUIDES, TangentPlane, check_size, read_surface, repair
+from onespp.denoise.inputs.repair import repair
+from onespp.denoise.inputs.surface import GUIDES, TangentPlane, check_size, read_surface
 from onespp.denoise.jit.arrays import Color, Float
 from onespp.denoise.jit.grid import Offset, Planes, Stencil, Step, Taps, window
 from onespp.denoise.jit.structure import evaluate

@@ -39,7 +39,8 @@ from onespp.denoise.history.reprojection import (
     without_images,
 )
 from onespp.denoise.inputs.demodulation import Texture, read_texture
-from onespp.denoise.inputs.surface import Surface, SurfaceSample, repair
+from onespp.denoise.inputs.repair import repair
+from onespp.denoise.inputs.surface import Surface, SurfaceSample
 from onespp.denoise.jit.arrays import Color, Float
 from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, single, window
 from onespp.denoise.jit.structure import evaluate

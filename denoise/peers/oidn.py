@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from onespp.denoise.inputs.surface import repair
+from onespp.denoise.inputs.repair import repair
 from onespp.denoise.methods.parameters import check_choice
 from onespp.denoise.methods.temporal import Temporal, TemporalState
 from onespp.render.errors import InputError

@@ -15,7 +15,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from onespp.denoise.geometry.correspondence import NOWHERE, previous_pixel
-from onespp.denoise.inputs.surface import GUIDES, repair
+from onespp.denoise.inputs.repair import repair
+from onespp.denoise.inputs.surface import GUIDES
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.host import backend
