@@ -10,22 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from onespp.denoise.metrics import flip
+from onespp.denoise.metrics.errors import PSNR_CAP, decibels, energy_error, mse, psnr, relmse, smape
+from onespp.denoise.metrics.image import non_finite
+from onespp.denoise.metrics.noise_floor import reference_floor
 from onespp.denoise.metrics.ssim import ssim
-from onespp.denoise.metrics.table import (
-    HEADLINE,
-    METRICS,
-    PSNR_CAP,
-    decibels,
-    energy_error,
-    measure,
-    mse,
-    non_finite,
-    psnr,
-    reference_floor,
-    relmse,
-    smape,
-    spread,
-)
+from onespp.denoise.metrics.table import HEADLINE, METRICS, measure, spread
 from onespp.denoise.metrics.tonemap import bytes_from_linear, linear_from_srgb, srgb_from_linear
 
 

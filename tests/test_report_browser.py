@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from onespp.denoise.metrics.flip import flip_map
-from onespp.denoise.metrics.table import pair
+from onespp.denoise.metrics.image import pair
 from onespp.denoise.metrics.tonemap import bytes_from_linear
 from onespp.denoise.report.html import write_report
 from onespp.denoise.score.sequence import score

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from onespp.denoise.metrics.table import METRICS, measure, reference_floor
+from onespp.denoise.metrics.noise_floor import reference_floor
+from onespp.denoise.metrics.table import METRICS, measure
 from onespp.denoise.report.terminal import caption, print_scores
 from onespp.denoise.score.scorecard import INPUT, read_scores
 from onespp.denoise.score.sequence import score

@@ -13,7 +13,8 @@ import numpy as np
 
 from onespp.denoise.geometry.correspondence import NOWHERE, carry
 
-from .table import METRICS, Metric, decibels, mse
+from .errors import decibels, mse
+from .table import METRICS, Metric
 
 
 @dataclass(frozen=True)

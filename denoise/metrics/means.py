@@ -16,7 +16,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from statistics import fmean
 
-from .table import PSNR_CAP, Metric
+from .errors import PSNR_CAP
+from .table import Metric
 
 _DECIBELS = "dB"
 

@@ -12,7 +12,8 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 from PIL import Image
 
-from onespp.denoise.metrics.table import HEADLINE, pair, spread
+from onespp.denoise.metrics.image import pair
+from onespp.denoise.metrics.table import HEADLINE, spread
 from onespp.denoise.metrics.tonemap import bytes_from_linear
 from onespp.denoise.score.scorecard import INPUT, Scores
 from onespp.render.files.atomic import replacing

@@ -17,7 +17,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from onespp.denoise.metrics.table import pair, reference_floor
+from onespp.denoise.metrics.image import pair
+from onespp.denoise.metrics.noise_floor import reference_floor
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import first_difference
 from onespp.render.files.sequence import Sequence

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from onespp.denoise.catalog import METHODS, Method
-from onespp.denoise.metrics.table import measure_pair, non_finite, pair, reference_floor
+from onespp.denoise.metrics.image import non_finite, pair
+from onespp.denoise.metrics.noise_floor import reference_floor
+from onespp.denoise.metrics.table import measure_pair
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence as Folder
 from onespp.render.frame import Frame

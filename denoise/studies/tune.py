@@ -19,8 +19,8 @@ import numpy as np
 
 from onespp.denoise.catalog import Method, build, channels_read, parameters
 from onespp.denoise.methods.parameters import present_parameters
+from onespp.denoise.metrics.errors import psnr
 from onespp.denoise.metrics.means import mean_decibels
-from onespp.denoise.metrics.table import psnr
 from onespp.denoise.metrics.tonemap import srgb_from_linear
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
