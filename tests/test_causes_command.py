@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from onespp.denoise.metrics.flicker import STABILITY
+from onespp.denoise.metrics.table import STABILITY
 from onespp.denoise.score.causes import CAUSES, HISTORIES
 from onespp.denoise.score.sequence import score
 from onespp.render.files.manifest import Manifest, Run

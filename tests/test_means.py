@@ -10,9 +10,8 @@ import pytest
 from rich.console import Console
 
 from onespp.denoise.metrics.errors import PSNR_CAP, psnr
-from onespp.denoise.metrics.flicker import MEASURES
 from onespp.denoise.metrics.means import mean_decibels, mean_over_frames
-from onespp.denoise.metrics.table import METRICS
+from onespp.denoise.metrics.table import MEASURES, METRICS
 from onespp.denoise.metrics.tonemap import srgb_from_linear
 from onespp.denoise.report.contact_sheets import display_error
 from onespp.denoise.report.terminal import cells, print_scores

@@ -9,7 +9,8 @@ import pytest
 
 from onespp.denoise.geometry.correspondence import NOWHERE
 from onespp.denoise.metrics.errors import PSNR_CAP
-from onespp.denoise.metrics.flicker import STABILITY, Step, boiling, difference_psnr, flicker
+from onespp.denoise.metrics.flicker import Step, boiling, difference_psnr, flicker
+from onespp.denoise.metrics.table import STABILITY
 
 
 def step(seed: int = 0, height: int = 5, width: int = 6) -> Step:

@@ -7,14 +7,12 @@ p a pixel, p' the pixel of frame t - 1 that shows p's surface (`correspondence.p
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
 from onespp.denoise.geometry.correspondence import NOWHERE, carry
 
 from .errors import decibels, mse
-from .table import METRICS, Metric
 
 
 @dataclass(frozen=True)
@@ -74,20 +72,3 @@ def boiling(step: Step) -> float | None:
         return None
     change = np.subtract(step.now[0], step.before[0], dtype=np.float64)
     return float(np.sqrt(np.mean(np.square(change)[step.still])))
-
-
-_ROWS = (
-    Metric("flicker", "flicker", flicker, "step", "", False, ".4f",
-           "sqrt(mean((e_t(p) - e_{t-1}(p'))^2)), e = S(a) - S(b), p' the pixel of the frame "
-           "before that shows p's surface; a sequence's is the mean over its frames"),
-    Metric("psnr_difference", "PSNR of differences", difference_psnr, "step", "dB", True, ".2f",
-           "PSNR of S(a_t) - S(a_{t-1}) against S(b_t) - S(b_{t-1})", in_table=False),
-    Metric("boiling", "boiling", boiling, "step", "", False, ".4f",
-           "sqrt(mean((S(a_t) - S(a_{t-1}))^2)) where neither surface, camera nor light has "
-           "changed", in_table=False),
-)
-
-STABILITY = MappingProxyType({row.name: row for row in _ROWS})
-
-MEASURES = MappingProxyType({**METRICS, **STABILITY})
-"""All that is known of a frame of a method: `FrameScore` has a value for each row."""

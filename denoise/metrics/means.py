@@ -17,7 +17,7 @@ from collections.abc import Collection, Iterable, Mapping
 from statistics import fmean
 
 from .errors import PSNR_CAP
-from .table import Metric
+from .metric import Metric
 
 _DECIBELS = "dB"
 

@@ -7,48 +7,18 @@ pixels and colours alike, in float64. A row says in which space its function tak
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable
 from types import MappingProxyType
 
 import numpy as np
 
 from . import flip
 from .errors import PSNR_CAP, energy_error, psnr, relmse, smape
+from .flicker import boiling, difference_psnr, flicker
 from .image import Pair, pair
+from .metric import Metric
 from .ssim import ssim
-
-
-@dataclass(frozen=True)
-class Metric:
-    """One measure of a frame.
-
-    Attributes:
-        name: key in scores.json and column in scores.csv.
-        label: heading in tables.
-        function: (a, b) -> float, finite for finite images; None where it does not apply.
-        space: what `function` takes, "linear" radiance, "srgb" display values, or a "step" of two
-            frames (`stability.py`).
-        unit: goes with the label, as "dB"; "" where there is none.
-        higher_is_better: the direction.
-        format: how tables print it.
-        about: the definition in a line.
-        in_table: whether it has a column on the terminal; the files have them all.
-        most_frames: for a slow one, the number of frames it is measured on, spread evenly; None:
-            all.
-    """
-
-    name: str
-    label: str
-    function: Callable[..., float | None]
-    space: str
-    unit: str
-    higher_is_better: bool
-    format: str
-    about: str
-    in_table: bool = True
-    most_frames: int | None = None
-
+from .table import METRICS
 
 _ROWS = (
     Metric("psnr_srgb", "PSNR", psnr, "srgb", "dB", True, ".2f",
@@ -103,3 +73,18 @@ def spread(frames: list[int], count: int | None) -> list[int]:
     if count is None or len(frames) <= count:
         return frames
     return [frames[i] for i in np.linspace(0, len(frames) - 1, count).round().astype(int)]
+
+
+_CHANGES = (
+    Metric("flicker", "flicker", flicker, "step", "", False, ".4f",
+           "sqrt(mean((e_t(p) - e_{t-1}(p'))^2)), e = S(a) - S(b), p' the pixel of the frame "
+           "before that shows p's surface; a sequence's is the mean over its frames"),
+    Metric("psnr_difference", "PSNR of differences", difference_psnr, "step", "dB", True, ".2f",
+           "PSNR of S(a_t) - S(a_{t-1}) against S(b_t) - S(b_{t-1})", in_table=False),
+    Metric("boiling", "boiling", boiling, "step", "", False, ".4f",
+           "sqrt(mean((S(a_t) - S(a_{t-1}))^2)) where neither surface, camera nor light has "
+           "changed", in_table=False),
+)
+STABILITY = MappingProxyType({row.name: row for row in _CHANGES})
+MEASURES = MappingProxyType({**METRICS, **STABILITY})
+"""All that is known of a frame of a method: `FrameScore` has a value for each row."""

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib import colormaps
 
 from onespp.denoise.metrics.errors import PSNR_CAP
-from onespp.denoise.metrics.flicker import MEASURES
-from onespp.denoise.metrics.table import HEADLINE, Metric
+from onespp.denoise.metrics.metric import Metric
+from onespp.denoise.metrics.table import HEADLINE, MEASURES
 from onespp.denoise.score.causes import CAUSES, HISTORIES
 from onespp.denoise.score.scorecard import INPUT, ClassScore, MethodScore, Scores
 from onespp.render.channels import CHANNELS

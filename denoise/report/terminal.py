@@ -7,8 +7,8 @@ import sys
 from rich.console import Console
 from rich.table import Table
 
-from onespp.denoise.metrics.flicker import MEASURES
-from onespp.denoise.metrics.table import HEADLINE, Metric
+from onespp.denoise.metrics.metric import Metric
+from onespp.denoise.metrics.table import HEADLINE, MEASURES
 from onespp.denoise.score.causes import CAUSES, HISTORIES
 from onespp.denoise.score.scorecard import INPUT, MethodScore, Scores
 

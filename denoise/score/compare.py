@@ -26,9 +26,9 @@ from rich.console import Console
 from rich.table import Table
 
 from onespp.denoise.methods.parameters import present_parameters
-from onespp.denoise.metrics.flicker import MEASURES
 from onespp.denoise.metrics.means import identical
-from onespp.denoise.metrics.table import Metric
+from onespp.denoise.metrics.metric import Metric
+from onespp.denoise.metrics.table import MEASURES
 from onespp.denoise.report.terminal import PLAIN_WIDTH
 from onespp.render.errors import InputError
 from onespp.render.files.json_file import JsonFile, format_json

@@ -14,8 +14,7 @@ from typing import Any
 
 from pydantic import ConfigDict, Field, FiniteFloat, field_validator, model_serializer
 
-from onespp.denoise.metrics.flicker import MEASURES
-from onespp.denoise.metrics.table import HEADLINE
+from onespp.denoise.metrics.table import HEADLINE, MEASURES
 from onespp.render.files.json_file import JsonFile, format_json, read_json
 
 INPUT = "input"

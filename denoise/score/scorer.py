@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from onespp.denoise.metrics.errors import decibels
-from onespp.denoise.metrics.flicker import MEASURES, STABILITY, Step
+from onespp.denoise.metrics.flicker import Step
 from onespp.denoise.metrics.image import Pair, non_finite, pair
-from onespp.denoise.metrics.table import measure_pair
+from onespp.denoise.metrics.table import MEASURES, STABILITY, measure_pair
 
 from .causes import BACKGROUND, CAUSES, HISTORIES, history_class
 from .frame_truth import Ground

@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 
 from onespp.denoise.metrics.errors import PSNR_CAP
-from onespp.denoise.metrics.flicker import MEASURES
 from onespp.denoise.metrics.image import non_finite
 from onespp.denoise.metrics.means import identical, mean_decibels, mean_over_frames
 from onespp.denoise.metrics.noise_floor import reference_floor
-from onespp.denoise.metrics.table import HEADLINE, METRICS, spread
+from onespp.denoise.metrics.table import HEADLINE, MEASURES, METRICS, spread
 from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.denoise.report.contact_sheets import Progress, draw_pictures
 from onespp.denoise.report.provenance import commands

@@ -15,8 +15,8 @@ from typing import Any
 import click
 
 from onespp.denoise.catalog import Method, build, channels_read, parameters
-from onespp.denoise.metrics.flicker import MEASURES
 from onespp.denoise.metrics.means import mean_over_frames
+from onespp.denoise.metrics.table import MEASURES
 from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.denoise.score.frame_truth import read_ground
 from onespp.denoise.score.scorer import Judge

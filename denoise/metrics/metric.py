@@ -1,0 +1,37 @@
+"""One measure of error: what it takes, its unit and its direction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One measure of a frame.
+
+    Attributes:
+        name: key in scores.json and column in scores.csv.
+        label: heading in tables.
+        function: (a, b) -> float, finite for finite images; None where it does not apply.
+        space: what `function` takes, "linear" radiance, "srgb" display values, or a "step" of two
+            frames (`stability.py`).
+        unit: goes with the label, as "dB"; "" where there is none.
+        higher_is_better: the direction.
+        format: how tables print it.
+        about: the definition in a line.
+        in_table: whether it has a column on the terminal; the files have them all.
+        most_frames: for a slow one, the number of frames it is measured on, spread evenly; None:
+            all.
+    """
+
+    name: str
+    label: str
+    function: Callable[..., float | None]
+    space: str
+    unit: str
+    higher_is_better: bool
+    format: str
+    about: str
+    in_table: bool = True
+    most_frames: int | None = None
