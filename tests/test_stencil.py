@@ -10,8 +10,10 @@ import pytest
 
 from onespp.denoise.history.reprojection import load_table
 from onespp.denoise.jit.fastmath import exp2
-from onespp.denoise.jit.grid import Stencil, Step, Taps
+from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import build, evaluate, flatten
+from onespp.denoise.jit.taps import Taps
 from onespp.denoise.methods.assignment import Assignment, AssignmentAtrous
 from onespp.denoise.methods.atrous import Atrous
 from onespp.denoise.methods.bilateral import Bilateral

@@ -15,8 +15,10 @@ from typing import Any, NamedTuple
 import drjit as dr
 
 from onespp.denoise.jit.arrays import Color, Float
-from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps
+from onespp.denoise.jit.grid import Planes, Stencil
+from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import evaluate
+from onespp.denoise.jit.taps import Taps
 
 
 class MeanVariance(NamedTuple):

@@ -25,7 +25,8 @@ import drjit as dr
 from onespp.denoise.inputs.surface import Surface
 from onespp.denoise.jit.arrays import Float, Vector3
 from onespp.denoise.jit.fastmath import exp2
-from onespp.denoise.jit.grid import Stencil, Taps, window
+from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.taps import Taps, window
 from onespp.denoise.methods.atrous import LOG2E, SPLINE, LuminanceColor, LuminanceWeight, NoisyColor
 
 EPSILON_DEPTH = 1e-3

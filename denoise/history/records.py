@@ -16,11 +16,12 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import drjit as dr
 
-from onespp.denoise.inputs.surface import SurfaceSample, dot
+from onespp.denoise.inputs.surface import SurfaceSample
 from onespp.denoise.jit.arrays import Bool, Float, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.masked import weighted_sums
 from onespp.denoise.jit.structure import arrays_of
+from onespp.denoise.jit.vector import dot
 from onespp.render.frame import Frame
 
 from .reprojection import LEAST_WEIGHT, Place

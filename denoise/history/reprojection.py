@@ -31,9 +31,10 @@ import numpy as np
 
 from onespp.denoise.geometry.cameras import camera_from_screen, screen_from_camera
 from onespp.denoise.geometry.motion import world_motions
-from onespp.denoise.inputs.surface import SurfaceSample, cross, dot, opaque_matrix, transform
+from onespp.denoise.inputs.surface import SurfaceSample
 from onespp.denoise.jit.arrays import Bool, Color, Float, Matrix3, UInt, Vector3
 from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.vector import cross, dot, opaque_matrix, transform
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 

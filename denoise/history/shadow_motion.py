@@ -29,10 +29,11 @@ import numpy as np
 from onespp.denoise.filters.penumbra import PenumbraSample, light_sizes, penumbra_samples
 from onespp.denoise.geometry.cameras import screen_from_camera
 from onespp.denoise.geometry.motion import inverses, world_motions
-from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane, dot, opaque_matrix, transform
+from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Bool, Float, Matrix3, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.masked import weighted_sums
+from onespp.denoise.jit.vector import dot, opaque_matrix, transform
 from onespp.render.channels import SHADOW
 from onespp.render.frame import Frame
 

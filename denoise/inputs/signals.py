@@ -24,14 +24,14 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.jit.arrays import Color, Float
+from onespp.denoise.jit.color import luminance, with_green
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import arrays_of
-from onespp.denoise.methods.atrous import LuminanceColor, with_green
+from onespp.denoise.methods.atrous import LuminanceColor
 from onespp.render.frame import Frame
 
 from .demodulation import Texture, read_texture
 from .repair import repair
-from .surface import luminance
 
 USED = ("direct", "indirect", "unshadowed", "visibility", "specular")
 LARGEST_VISIBILITY = 2.0

@@ -13,7 +13,6 @@ has a direction; where one of these is missing or not finite it counts as backgr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,13 +20,13 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.geometry.cameras import camera_from_screen
-from onespp.denoise.jit.arrays import Bool, Float, Matrix3, Vector3
+from onespp.denoise.jit.arrays import Bool, Float, Vector3
 from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.vector import dot, opaque_matrix, transform
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 
 GUIDES = ("normal", "depth", "id")
-LUMINANCE = (0.2126, 0.7152, 0.0722)
 _FARTHEST = 1e15  # a greater depth counts as background: its square would overflow
 
 
@@ -118,26 +117,3 @@ def check_size(frame: Frame, stencil: Stencil) -> None:
     if (frame.height, frame.width) != (stencil.height, stencil.width):
         raise InputError(f"frame {frame.index} is {frame.width}x{frame.height}, the denoiser's "
                          f"state was made for {stencil.width}x{stencil.height}: make a new one")
-
-
-def dot(a: Vector3, b: Vector3) -> Float:
-    return dr.fma(a.x, b.x, dr.fma(a.y, b.y, a.z * b.z))
-
-
-def cross(a: Vector3, b: Vector3) -> Vector3:
-    return Vector3(*[dr.fma(a[i], b[j], -(a[j] * b[i])) for i, j in ((1, 2), (2, 0), (0, 1))])
-
-
-def transform(matrix: Matrix3, vector: Vector3) -> Vector3:
-    return Vector3(*[dot(row, vector) for row in matrix])
-
-
-def opaque_matrix(stencil: Stencil, matrix: np.ndarray) -> Matrix3:
-    """A (3, 3) matrix that a kernel takes as an argument."""
-    return Matrix3(*[Vector3(*[stencil.opaque(x) for x in row]) for row in matrix])
-
-
-def luminance(color: Sequence[Float]) -> Float:
-    """Relative luminance of linear Rec. 709 radiance."""
-    red, green, blue = LUMINANCE
-    return dr.fma(color[0], red, dr.fma(color[1], green, color[2] * blue))

@@ -20,12 +20,9 @@ scatter would cost five times as much, and in a frozen function it silently writ
 # pyright: standard
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from types import ModuleType
-from typing import Any, Generic, ParamSpec, TypeVar, cast
+from typing import Any
 
 import drjit as dr
 import numpy as np
@@ -34,25 +31,14 @@ from onespp.render.errors import InputError
 from onespp.render.host import backend
 
 from .arrays import Float
-from .structure import Form, arrays_of, build, flatten
-
-P = ParamSpec("P")
-R = TypeVar("R")
-T = TypeVar("T")
-Named = TypeVar("Named")
-Offset = tuple[int, int]
+from .structure import arrays_of
+from .taps import Offset, Taps, _listed
 
 _TAIL = 64  # floats after the last lane that a vector load may touch
 _LINE = 16  # floats in a cache line
 _SHIFT = 7  # floats from a cache line to the first pixel: no filter has taps 7 to the left
 _GATHERED = 8  # words that one packed gather brings, at most
 _SETS = 64  # sets of a first-level cache: lines that far apart displace each other
-
-
-def window(radius: int) -> list[Offset]:
-    """Offsets of the pixels around one, row by row, without it."""
-    side = range(-radius, radius + 1)
-    return [(dy, dx) for dy in side for dx in side if dy or dx]
 
 
 def _round_up(n: int, multiple: int) -> int:
@@ -294,128 +280,6 @@ def _allocate(size: int, value: float, index: int, shift: int) -> np.ndarray:
     return floats
 
 
-@dataclass(frozen=True)
-class Taps(Generic[T]):
-    """Planes at a few offsets: `taps.at(t)` is the planes as seen from the t-th neighbour, a list
-    unless they were `named`."""
-
-    views: list[list[Float]]
-    planes: list[Float]
-    starts: list[Any]
-    lanes: int
-    backend: dr.JitBackend
-    make: Callable[..., T]
-
-    def named(self, make: Callable[..., Named]) -> Taps[Named]:
-        """The same taps, of which `at` gives make(*planes), such as a NamedTuple."""
-        return Taps(self.views, self.planes, self.starts, self.lanes, self.backend, make)
-
-    def __len__(self) -> int:
-        return len(self.views) or len(self.starts)
-
-    @property
-    def arrays(self) -> list[list[Float]]:
-        """All arrays that a kernel must be given."""
-        return self.views or [self.planes, self.starts]
-
-    def seen_as(self, arrays: list[list[Float]]) -> Taps[T]:
-        """The same taps of arrays that stand for these."""
-        if self.views:
-            return replace(self, views=arrays)
-        return replace(self, planes=arrays[0], starts=arrays[1])
-
-    def next(self) -> None:
-        """Call at the end of a tap: keeps it apart from the following one while compiling.
-
-        Dr.Jit orders operations by scope; with one scope a tap, independent accumulators
-        interleave and fewer values wait in registers (1.2 to 2 times faster). An internal call.
-        """
-        dr.detail.new_scope(self.backend)
-
-    def at(self, t: int) -> T:
-        if self.views:
-            return self.make(*self.views[t])
-        lane = dr.arange(type(self.starts[t]), self.lanes) + self.starts[t]
-        return self.make(*[dr.gather(type(plane), plane, lane) for plane in self.planes])
-
-
-def _listed(*planes: Float) -> list[Float]:
-    return list(planes)
-
-
 def single(plane: Float) -> Float:
     """For `Taps.named`, of taps of one plane."""
     return plane
-
-
-class Step(Generic[P, R]):
-    """A function of structures of Dr.Jit arrays and taps, recorded at its first call and replayed
-    after that.
-
-    An argument is a `structure` (`structure.py`): an array, None, taps, or a NamedTuple, tuple or
-    list of such; so is the result, but without taps. Another form, such as None where there was an
-    array, or other numbers of lanes, record again.
-
-    Make one for each grid and each place it is called from: a recording holds the size of the
-    grid, and which of its arguments share memory.
-
-    Raises:
-        TypeError: at a call, where an argument holds something else. A number that a kernel takes
-            is an array too (`Stencil.opaque`): otherwise it would be recorded. Of a result,
-            Dr.Jit makes it the cause of its RuntimeError.
-    """
-
-    def __init__(self, function: Callable[P, R]) -> None:
-        call, traced = _Call(), cast("Callable[..., R]", function)
-
-        def record(arrays: list[Any], taps: list[list[Any]]) -> list[Any]:
-            seen = [a.seen_as(b) for a, b in zip(call.taps, taps, strict=True)]
-            arguments = build(call.form, arrays, seen)
-            results = flatten(traced(*arguments))
-            call.results[call.number] = results.form
-            return results.arrays
-
-        self._call = call
-        self._frozen: Any = dr.freeze(record, state_fn=lambda *_: call.number, warn_after=1000)
-
-    def __call__(self, *arguments: P.args, **_: P.kwargs) -> R:
-        call = self._call
-        call.form, arrays, call.taps = flatten(arguments)
-        call.number = call.numbers.setdefault(call.form, len(call.numbers))
-        try:
-            with _no_collection():
-                results = self._frozen(arrays, [taps.arrays for taps in call.taps])
-        finally:
-            call.taps = []
-        return build(call.results[call.number], results)
-
-    @property
-    def recordings(self) -> int:
-        return self._frozen.n_recordings
-
-
-class _Call:
-    """The call that is being made: its taps, its form, and the number of that among the forms seen,
-    for Dr.Jit walks what tells recordings apart; and the form of the results, by that number.
-    Dr.Jit walks all that a recorded function's closure holds, at every call, but not into an object
-    such as this."""
-
-    def __init__(self) -> None:
-        self.taps: list[Taps] = []
-        self.form: Form = ()
-        self.number = 0
-        self.numbers: dict[Form, int] = {}
-        self.results: dict[int, Form] = {}
-
-
-@contextmanager
-def _no_collection() -> Iterator[None]:
-    """Keeps Python's cycle collector away: an array that it frees while Dr.Jit records a step ends
-    the process (`enqueue_host_func(): this function cannot be recorded`)."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()

@@ -28,8 +28,10 @@ import numpy as np
 
 from onespp.denoise.history.records import RecordState
 from onespp.denoise.jit.arrays import Float
-from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, window
+from onespp.denoise.jit.grid import Planes, Stencil
+from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import evaluate, mapped
+from onespp.denoise.jit.taps import Taps, window
 from onespp.render.channels import REPLAY
 from onespp.render.frame import Frame
 

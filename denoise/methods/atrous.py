@@ -38,11 +38,14 @@ from typing import NamedTuple
 import drjit as dr
 
 from onespp.denoise.inputs.demodulation import read_texture
-from onespp.denoise.inputs.surface import LUMINANCE, Surface, TangentPlane, luminance
+from onespp.denoise.inputs.surface import Surface, TangentPlane
 from onespp.denoise.jit.arrays import Color, Float, Vector3
+from onespp.denoise.jit.color import luminance, with_green
 from onespp.denoise.jit.fastmath import exp2
-from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, single, window
+from onespp.denoise.jit.grid import Planes, Stencil, single
+from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import evaluate
+from onespp.denoise.jit.taps import Taps, window
 from onespp.render.frame import Frame
 
 from .base import OnLanes
@@ -322,9 +325,3 @@ def mean_of_taps(signal: Taps[NoisyColor], guides: Taps[Guides], plane: TangentP
 
 def with_luminance(color: Color) -> LuminanceColor:
     return LuminanceColor(color.red, luminance(color), color.blue)
-
-
-def with_green(color: LuminanceColor) -> Color:
-    r, y, b = color
-    red, green, blue = LUMINANCE
-    return Color(r, dr.fma(r, -red / green, dr.fma(b, -blue / green, y * (1 / green))), b)

@@ -32,8 +32,10 @@ from onespp.denoise.inputs.demodulation import read_texture
 from onespp.denoise.inputs.surface import Surface
 from onespp.denoise.jit.arrays import Color, Float, Vector3
 from onespp.denoise.jit.fastmath import exp2
-from onespp.denoise.jit.grid import Offset, Planes, Stencil, Step, Taps
+from onespp.denoise.jit.grid import Planes, Stencil
+from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import evaluate
+from onespp.denoise.jit.taps import Offset, Taps
 from onespp.render.frame import Frame
 
 from .base import OnLanes

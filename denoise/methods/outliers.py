@@ -31,8 +31,10 @@ from onespp.denoise.inputs.demodulation import Texture, read_texture
 from onespp.denoise.inputs.repair import repair
 from onespp.denoise.inputs.surface import GUIDES, TangentPlane, check_size, read_surface
 from onespp.denoise.jit.arrays import Color, Float
-from onespp.denoise.jit.grid import Offset, Planes, Stencil, Step, Taps, window
+from onespp.denoise.jit.grid import Planes, Stencil
+from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import evaluate
+from onespp.denoise.jit.taps import Offset, Taps, window
 from onespp.denoise.metrics.luminance import luminance
 from onespp.render.frame import Frame
 

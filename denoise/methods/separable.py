@@ -24,7 +24,8 @@ from dataclasses import dataclass
 from onespp.denoise.inputs.demodulation import read_texture
 from onespp.denoise.inputs.surface import Surface
 from onespp.denoise.jit.arrays import Color
-from onespp.denoise.jit.grid import Stencil, Step
+from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import evaluate
 from onespp.render.frame import Frame
 

@@ -42,8 +42,11 @@ from onespp.denoise.inputs.demodulation import Texture, read_texture
 from onespp.denoise.inputs.repair import repair
 from onespp.denoise.inputs.surface import Surface, SurfaceSample
 from onespp.denoise.jit.arrays import Color, Float
-from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, single, window
+from onespp.denoise.jit.color import with_green
+from onespp.denoise.jit.grid import Planes, Stencil, single
+from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import evaluate
+from onespp.denoise.jit.taps import Taps, window
 from onespp.render.frame import Frame
 
 from .atrous import (
@@ -54,7 +57,6 @@ from .atrous import (
     luminance_scale,
     luminance_weight,
     noisy_color,
-    with_green,
     with_luminance,
 )
 from .base import OnLanes

@@ -32,8 +32,10 @@ from onespp.denoise.history.reprojection import (
 )
 from onespp.denoise.inputs.surface import Surface, SurfaceSample
 from onespp.denoise.jit.arrays import Color, Float
-from onespp.denoise.jit.grid import Stencil, Step, Taps
+from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import evaluate
+from onespp.denoise.jit.taps import Taps
 from onespp.render.frame import Frame
 
 from .base import OnLanes

@@ -61,9 +61,10 @@ from onespp.denoise.inputs.signals import Signal, SignalKind
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Bool, Float
 from onespp.denoise.jit.fastmath import exp2
-from onespp.denoise.jit.grid import Offset, Stencil, Taps, window
+from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.masked import tabulate, weighted_sums, window_taps
 from onespp.denoise.jit.structure import mapped
+from onespp.denoise.jit.taps import Offset, Taps, window
 from onespp.denoise.methods.atrous import EPSILON, LOG2E
 
 from .layout import History, NoisySignal, PlaneRule, SignalLayout, Smoothed

@@ -30,8 +30,10 @@ from onespp.denoise.history.shadow_motion import (
 from onespp.denoise.inputs.signals import USED, Signal, SignalKind, read_signals
 from onespp.denoise.inputs.surface import Surface, SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Bool, Color, Float, Vector3
-from onespp.denoise.jit.grid import Planes, Stencil, Step, Taps, window
+from onespp.denoise.jit.grid import Planes, Stencil
+from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import arrays_of, build, evaluate, flatten
+from onespp.denoise.jit.taps import Taps, window
 from onespp.denoise.methods.atrous import BACKGROUND, LARGEST_LEVELS, LOG2E
 from onespp.denoise.methods.base import OnLanes
 from onespp.denoise.methods.parameters import (
