@@ -8,8 +8,9 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from onespp.denoise.filters.penumbra import PenumbraSample, footprint_falloff, light_sizes
-from onespp.denoise.history.shadow_motion import follow_shadows, read_shadow_rays
+from onespp.denoise.filters.penumbra import PenumbraSample, footprint_falloff
+from onespp.denoise.history.shadow_motion import follow_shadows
+from onespp.denoise.inputs.shadow_rays import light_sizes, read_shadow_rays
 from onespp.denoise.inputs.surface import read_surface
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onespp.denoise.history.shadow_motion import read_shadow_rays, shadow_motion
+from onespp.denoise.history.shadow_motion import shadow_motion
+from onespp.denoise.inputs.shadow_rays import read_shadow_rays
 from onespp.denoise.inputs.surface import read_surface
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation

@@ -23,41 +23,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import drjit as dr
-import numpy as np
 
-from onespp.denoise.geometry.cameras import camera_from_screen
 from onespp.denoise.jit.arrays import Bool, Float
 from onespp.denoise.jit.grid import Stencil
-from onespp.render.frame import Frame
-
-_SAMPLES = 2048   # pixels that sizes of lights are estimated from
-_FEWEST = 4       # points of a light, or its size is not known
-_FARTHEST = 1e15  # of a point of a light that counts
-
-
-def light_sizes(frame: Frame) -> np.ndarray:
-    """(objects + 1,) float32: twice the standard deviation of the points of each object that shadow
-    rays asked for and, last, of the environment's points. Infinite for less than `_FEWEST`."""
-    count = len(frame.world_from_object) + 1
-    step = max(1, round((frame.height * frame.width / _SAMPLES) ** 0.5))
-    some = slice(step // 2, None, step)
-    depth, light, id_ = (frame[name][some, some] for name in ("depth", "light", "light_id"))
-    b = camera_from_screen(frame)
-    y, x = (np.arange(some.start, size, step)[:, None] + 0.5 for size in frame["id"].shape)
-    ray = (y * b[:, 1])[:, None] + x * b[:, 0] + b[:, 2]
-    with np.errstate(invalid="ignore", over="ignore"):
-        point = depth[..., None] * ray + light @ frame.camera_from_world[:3, :3].T
-        good = ((frame["id"][some, some] >= 0) & (np.abs(light).sum(-1) > 0)
-                & (np.abs(point) < _FARTHEST).all(-1) & (id_ < count - 1))
-    of, point = np.where(id_ < 0, count - 1, id_)[good].astype(int), point[good]
-    number = np.bincount(of, minlength=count)
-
-    def mean(values: np.ndarray) -> np.ndarray:
-        return np.bincount(of, values, count) / np.maximum(number, 1)
-
-    center = np.stack([mean(point[:, c]) for c in range(3)], -1)
-    size = 2 * np.sqrt(mean(np.square(point - center[of]).sum(-1)))
-    return np.where(number < _FEWEST, np.inf, size).astype(np.float32)
 
 
 class PenumbraSample(NamedTuple):

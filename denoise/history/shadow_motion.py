@@ -24,18 +24,14 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import drjit as dr
-import numpy as np
 
-from onespp.denoise.filters.penumbra import PenumbraSample, light_sizes, penumbra_samples
-from onespp.denoise.geometry.cameras import screen_from_camera
-from onespp.denoise.geometry.motion import inverses, world_motions
+from onespp.denoise.filters.penumbra import PenumbraSample, penumbra_samples
+from onespp.denoise.inputs.shadow_rays import MATRIX_WORDS, ShadowRays, stopped
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
-from onespp.denoise.jit.arrays import Bool, Float, Matrix3, Vector3
+from onespp.denoise.jit.arrays import Bool, Float, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.masked import weighted_sums
-from onespp.denoise.jit.vector import dot, opaque_matrix, transform
-from onespp.render.channels import SHADOW
-from onespp.render.frame import Frame
+from onespp.denoise.jit.vector import dot, transform
 
 from .records import look_up
 from .reprojection import Motion, ReprojectionTests, ScreenShift, locate
@@ -45,48 +41,6 @@ CHOICE_LEVELS = 5  # of the smoothing of squared innovations
 MIN_MOTION = 0.05  # pixels a frame: a shadow that moves less stands still
 MIN_SHARE = 1e-3  # of the pixels around, below which nothing moves
 MAX_MOTION = 0.25  # of the screen's width: history could not follow what is quicker
-_MATRIX = 16      # floats
-
-
-def has_shadow_rays(frame: Frame) -> bool:
-    return all(name in frame for name in SHADOW)
-
-
-def shadow_table(previous: Frame, current: Frame) -> np.ndarray:
-    """(objects + 1, 2, 16) float32: T and T^-1 of each object and, last, of what stands still."""
-    motions = np.concatenate([world_motions(previous, current), np.eye(4)[None]])
-    t = previous.camera_from_world @ motions @ np.linalg.inv(current.camera_from_world)
-    return np.stack([t, inverses(t)], 1).astype(np.float32).reshape(-1, 2, _MATRIX)
-
-
-class ShadowRay(NamedTuple):
-    """One ray a pixel, traced and not yet evaluated.
-
-    Attributes:
-        light: from the surface to the point of the light, world axes. light_id: its object ID.
-        blocker_distance, blocker_id: of what stopped the ray.
-    """
-
-    light: Vector3
-    light_id: Float
-    blocker_distance: Float
-    blocker_id: Float
-
-
-class ShadowRays(NamedTuple):
-    """What `follow_shadows` asks for.
-
-    Attributes:
-        ray: of each pixel. objects: their number.
-        table: of `shadow_table`. light_sizes: of `penumbra.light_sizes`.
-    """
-
-    ray: ShadowRay
-    table: Float
-    light_sizes: Float
-    camera_from_world: Matrix3
-    screen_from_camera: Matrix3
-    objects: Float
 
 
 class ShadowMotion(NamedTuple):
@@ -112,18 +66,6 @@ class ShadowHistory(NamedTuple):
     is_valid: Bool
 
 
-def read_shadow_rays(frame: Frame, previous: Frame, stencil: Stencil) -> ShadowRays:
-    """The shadow rays of a frame; of the frame before, the matrices alone are read."""
-    light, light_id, blocker_distance, blocker_id = (
-        stencil.load(np.ascontiguousarray(frame[name], np.float32)) for name in SHADOW)
-    return ShadowRays(ShadowRay(Vector3(*light), *light_id, *blocker_distance, *blocker_id),
-                      stencil.table(shadow_table(previous, frame)),
-                      stencil.table(light_sizes(frame)),
-                      opaque_matrix(stencil, frame.camera_from_world[:3, :3]),
-                      opaque_matrix(stencil, screen_from_camera(frame)),
-                      stencil.opaque(len(frame.world_from_object)))
-
-
 def shadow_motion(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
                   position: Vector3) -> ShadowMotion:
     """How each pixel's shadow moved; position: X."""
@@ -137,7 +79,7 @@ def shadow_motion(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
     def follow(_: Any) -> tuple[Float, list[Float]]:
         def matrix(object_: Float, inverse: int) -> list[Float]:
             row = 2 * stencil.UInt(dr.select(blocked, object_, 0)) + inverse
-            return stencil.unpack(rays.table, row, _MATRIX)
+            return stencil.unpack(rays.table, row, MATRIX_WORDS)
 
         back = matrix(stencil.Float(id_), 1)
 
@@ -176,15 +118,6 @@ def follow_shadows(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
     return Shadows(shadow_motion(stencil, rays, surface, position),
                    penumbra_samples(stencil, blocked, rays.ray.blocker_distance * scale, cosine,
                                     rays.ray.light_id, surface.depth, focal, rays.light_sizes))
-
-
-def stopped(rays: ShadowRays, id_: Float) -> tuple[Bool, Float]:
-    """Whether an object stopped each shadow ray, and 1 over the whole ray's length."""
-    (light, light_id, distance, blocker_id), objects = rays.ray, rays.objects
-    length2 = dot(light, light)
-    blocked = ((id_ >= 0) & (id_ < objects) & (distance > 0) & (length2 > 0) & (blocker_id >= 0)
-               & (blocker_id < objects) & (light_id < objects))
-    return blocked, dr.rsqrt(dr.select(blocked, length2, 1))
 
 
 def _moved(matrix: list[Float], point: Vector3) -> Vector3:

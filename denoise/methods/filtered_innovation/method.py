@@ -19,14 +19,8 @@ import drjit as dr
 
 from onespp.denoise.history.records import RecordState, no_history
 from onespp.denoise.history.reprojection import ReprojectionTests, motion_between, without_images
-from onespp.denoise.history.shadow_motion import (
-    SPREAD_LEVEL,
-    ShadowRays,
-    Shadows,
-    follow_shadows,
-    has_shadow_rays,
-    read_shadow_rays,
-)
+from onespp.denoise.history.shadow_motion import SPREAD_LEVEL, Shadows, follow_shadows
+from onespp.denoise.inputs.shadow_rays import ShadowRays, has_shadow_rays, read_shadow_rays
 from onespp.denoise.inputs.signals import USED, Signal, SignalKind, read_signals
 from onespp.denoise.inputs.surface import Surface, SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Bool, Color, Float, Vector3
