@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from onespp.denoise.filters.penumbra import PenumbraSample, footprint_falloff
-from onespp.denoise.history.shadow_motion import follow_shadows
 from onespp.denoise.inputs.shadow_rays import light_sizes, read_shadow_rays
 from onespp.denoise.inputs.surface import read_surface
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
+from onespp.denoise.methods.filtered_innovation.shadows import follow_shadows
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Rectangle, Shape
 from onespp.scenes.transforms import look_at, rotate, scale, translate

@@ -25,7 +25,6 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from onespp.denoise.filters.penumbra import PenumbraSample, penumbra_samples
 from onespp.denoise.inputs.shadow_rays import MATRIX_WORDS, ShadowRays, stopped
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Bool, Float, Vector3
@@ -49,13 +48,6 @@ class ShadowMotion(NamedTuple):
     moves: Float
     dx: Float
     dy: Float
-
-
-class Shadows(NamedTuple):
-    """What shadow rays tell of each pixel, or means over the pixels around."""
-
-    motion: ShadowMotion
-    penumbra: PenumbraSample
 
 
 class ShadowHistory(NamedTuple):
@@ -106,18 +98,6 @@ def shadow_motion(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
 
     moves, (dx, dy) = weighted_sums(stencil, blocked, 1, 2, follow)
     return ShadowMotion(moves, dx, dy)
-
-
-def follow_shadows(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
-                   position: Vector3) -> Shadows:
-    """`shadow_motion` and `penumbra_samples` of each pixel; arguments as of the former."""
-    blocked, scale = stopped(rays, surface.id)
-    light = transform(rays.camera_from_world, rays.ray.light)
-    cosine = dr.abs(dot(surface.normal, light)) * scale
-    focal = dr.abs(rays.screen_from_camera.x.x)
-    return Shadows(shadow_motion(stencil, rays, surface, position),
-                   penumbra_samples(stencil, blocked, rays.ray.blocker_distance * scale, cosine,
-                                    rays.ray.light_id, surface.depth, focal, rays.light_sizes))
 
 
 def _moved(matrix: list[Float], point: Vector3) -> Vector3:

@@ -11,23 +11,21 @@ Parameters were found by measurement: see `tune.py`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, TypeVar
+from typing import ClassVar
 
 import drjit as dr
 
 from onespp.denoise.history.records import RecordState, no_history
 from onespp.denoise.history.reprojection import ReprojectionTests, motion_between, without_images
-from onespp.denoise.history.shadow_motion import SPREAD_LEVEL, Shadows, follow_shadows
-from onespp.denoise.inputs.shadow_rays import ShadowRays, has_shadow_rays, read_shadow_rays
-from onespp.denoise.inputs.signals import USED, Signal, SignalKind, read_signals
-from onespp.denoise.inputs.surface import Surface, SurfaceSample, TangentPlane
-from onespp.denoise.jit.arrays import Bool, Color, Float, Vector3
-from onespp.denoise.jit.grid import Planes, Stencil
-from onespp.denoise.jit.step import Step
-from onespp.denoise.jit.structure import arrays_of, build, evaluate, flatten
-from onespp.denoise.jit.taps import Taps, window
+from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
+from onespp.denoise.inputs.shadow_rays import has_shadow_rays, read_shadow_rays
+from onespp.denoise.inputs.signals import USED, SignalKind, read_signals
+from onespp.denoise.inputs.surface import Surface, TangentPlane
+from onespp.denoise.jit.arrays import Bool, Color, Float
+from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.structure import evaluate
 from onespp.denoise.methods.atrous import BACKGROUND, LARGEST_LEVELS, LOG2E
 from onespp.denoise.methods.base import OnLanes
 from onespp.denoise.methods.parameters import (
@@ -39,27 +37,12 @@ from onespp.denoise.methods.parameters import (
 from onespp.render.channels import SHADOW
 from onespp.render.frame import Frame
 
-from .innovation import (
-    Gains,
-    Innovations,
-    Merged,
-    OutputFalloff,
-    SurfaceTap,
-    innovations,
-    merge,
-    output_level,
-    pack_history,
-    smooth_level,
-    to_smooth,
-)
-from .layout import ENERGY_LEVELS, History, PlaneRule, SignalLayout, Smoothed
+from .layout import ENERGY_LEVELS, History, SignalLayout
+from .merging import Gains
+from .passes import Passes
 
-_OUTSIDE = -1e15          # 1/z outside the image
 _BLACK = 2 * BACKGROUND   # 1/z of a surface that reflects nothing: a lamp
 _BACKGROUND_SCALE = 1e3   # |k| / sigma_plane of background and lamps, whose like alone count
-_SHADOW_PLANES = 5        # of `Shadows`
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -201,108 +184,4 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
                 for sigma in layout.each(self.light_sigma, self.visibility_sigma)]
 
 
-@dataclass(frozen=True)
-class Level:
-    """A pass over the first planes: their taps and those of surfaces, and the recorded step, which
-    gives these planes."""
-
-    values: Taps
-    surfaces: Taps[SurfaceTap]
-    spacing: Float
-    step: Step[..., list[Float]]
-    count: int
-
-    @staticmethod
-    def make(i: int, planes: Planes, count: int, surfaces: Planes, inverse_depth: int,
-             function: Callable[..., Any], named: Callable[..., Any] | None = None) -> Level:
-        """Level i, over `count` planes; inverse_depth: which of the planes of `surfaces`."""
-        offsets = [(dy << i, dx << i) for dy, dx in (*window(1), (0, 0))]
-        values = planes.taps(offsets, range(count))
-        return Level(values.named(named) if named else values,
-                     surfaces.taps(offsets, [inverse_depth, _ID]).named(SurfaceTap),
-                     planes.stencil.opaque(1 << i),
-                     Step(lambda *a: arrays_of(function(*a))), count)
-
-
 _ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH = range(3)  # planes of the surface
-
-
-@dataclass(frozen=True)
-class Passes:
-    """The planes and recorded steps of a layout, and the passes that they are.
-
-    Attributes:
-        surfaces: planes of object ID, 1/z, and 1/z of what has a history.
-        buffer: planes of what is being smoothed or filtered, see `signal_layout.py`.
-    """
-
-    stencil: Stencil
-    layout: SignalLayout
-    surfaces: Planes
-    buffer: Planes
-    follow_shadows: Step[..., Shadows]
-    spread: Level
-    innovations: Step[..., Innovations]
-    smoothing: list[Level]
-    merge: Step[..., Merged]
-    output: list[Level]
-    pack: Step[..., Float]
-
-    @staticmethod
-    def make(stencil: Stencil, layout: SignalLayout) -> Passes:
-        surfaces = stencil.planes([-1.0, _OUTSIDE, _OUTSIDE])
-        buffer = stencil.planes([0.0] * len(layout.smoothing_rules))
-
-        def smoothing(i: int) -> Level:
-            rules = layout.smoothing_level(i)
-            return Level.make(i, buffer, len(rules), surfaces, _VALID_INVERSE_DEPTH,
-                              lambda *a: smooth_level(rules, *a))
-
-        def output(i: int) -> Level:
-            kinds = layout.output_level(i)
-            return Level.make(i, buffer, layout.output_planes(kinds), surfaces, _INVERSE_DEPTH,
-                              lambda *a: output_level(layout, i, *a), layout.noisy_signals(kinds))
-
-        spread = [PlaneRule(SPREAD_LEVEL)] * _SHADOW_PLANES
-        return Passes(
-            stencil, layout, surfaces, buffer, Step(lambda *a: follow_shadows(stencil, *a)),
-            Level.make(SPREAD_LEVEL, buffer, _SHADOW_PLANES, surfaces, _INVERSE_DEPTH,
-                       lambda *a: smooth_level(spread, *a)),
-            Step(lambda *a: innovations(stencil, layout, *a)),
-            [smoothing(i) for i in range(layout.innovation_levels)],
-            Step(lambda *a: merge(stencil, layout, *a)),
-            [output(i) for i in range(layout.output_levels)],
-            Step(lambda *a: pack_history(stencil, layout, *a)))
-
-    def store_surface(self, id_: Float, plane: TangentPlane) -> None:
-        self.surfaces.store([id_, plane.inverse_depth])
-
-    def spread_shadows(self, rays: ShadowRays | None, surface: SurfaceSample, position: Vector3,
-                       plane: TangentPlane) -> Shadows | None:
-        """`follow_shadows`, and means of it over a few pixels around."""
-        if rays is None:
-            return None
-        return self._through([self.spread], self.follow_shadows(rays, surface, position), plane)
-
-    def smooth_innovations(self, found: Innovations, plane: TangentPlane) -> Smoothed:
-        """Q, S and W of the innovation, over pixels that have a history."""
-        self.surfaces.store(found.valid_inverse_depth, first=_VALID_INVERSE_DEPTH)
-        return self._through(self.smoothing, to_smooth(self.layout, found), plane,
-                             found.footprint_falloff)
-
-    def filter_output(self, merged: Merged, found: Innovations, plane: TangentPlane,
-                      sigmas: list[Float]) -> list[Signal]:
-        """The last filter of each signal."""
-        falloff = OutputFalloff(merged.fade, found.footprint_falloff)
-        filtered = self._through(self.output, merged.signals, plane, falloff, sigmas)
-        return [noisy.signal for noisy in filtered]
-
-    def _through(self, levels: list[Level], values: T, plane: TangentPlane,
-                 *arguments: Any) -> T:
-        """Values after these levels, of which later ones may be of the first planes alone."""
-        form, planes, _ = flatten(values)
-        for level in levels:
-            self.buffer.store(planes[:level.count], gutters=True)
-            planes[:level.count] = level.step(level.values, level.surfaces, plane, level.spacing,
-                                              *arguments)
-        return build(form, planes)

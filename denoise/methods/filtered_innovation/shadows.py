@@ -1,0 +1,34 @@
+"""What shadow rays say of each pixel: how its shadow moves, and how soft it is."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import drjit as dr
+
+from onespp.denoise.filters.penumbra import PenumbraSample, penumbra_samples
+from onespp.denoise.history.shadow_motion import ShadowMotion, shadow_motion
+from onespp.denoise.inputs.shadow_rays import ShadowRays, stopped
+from onespp.denoise.inputs.surface import SurfaceSample
+from onespp.denoise.jit.arrays import Vector3
+from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.vector import dot, transform
+
+
+class Shadows(NamedTuple):
+    """What shadow rays tell of each pixel, or means over the pixels around."""
+
+    motion: ShadowMotion
+    penumbra: PenumbraSample
+
+
+def follow_shadows(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
+                   position: Vector3) -> Shadows:
+    """`shadow_motion` and `penumbra_samples` of each pixel; arguments as of the former."""
+    blocked, scale = stopped(rays, surface.id)
+    light = transform(rays.camera_from_world, rays.ray.light)
+    cosine = dr.abs(dot(surface.normal, light)) * scale
+    focal = dr.abs(rays.screen_from_camera.x.x)
+    return Shadows(shadow_motion(stencil, rays, surface, position),
+                   penumbra_samples(stencil, blocked, rays.ray.blocker_distance * scale, cosine,
+                                    rays.ray.light_id, surface.depth, focal, rays.light_sizes))

@@ -1,0 +1,55 @@
+"""The wide smoothing of the innovation, over the surface by geometry alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import drjit as dr
+
+from onespp.denoise.filters.tangent_plane import BINOMIAL, SurfaceTap, surface_exponent
+from onespp.denoise.inputs.surface import TangentPlane
+from onespp.denoise.jit.arrays import Float
+from onespp.denoise.jit.fastmath import exp2
+from onespp.denoise.jit.taps import Offset, Taps, window
+
+from .layout import PlaneRule
+
+
+def smooth_level(rules: Sequence[PlaneRule], values: Taps[list[Float]], surfaces: Taps[SurfaceTap],
+                 plane: TangentPlane, spacing: Float,
+                 falloff: Float | None = None) -> list[Float]:
+    """One level of S, and of Q. The last tap is the pixel itself.
+
+    Args:
+        rules: of each plane in `values`. spacing: pixels between taps.
+        falloff: `penumbra.footprint_falloff`, for planes that are `within_penumbra`.
+    """
+    exponent, nearer = surface_exponent(surfaces, plane, spacing), footprint(falloff, spacing)
+    h0 = BINOMIAL[0]**2
+
+    def each(wide: Any, within_penumbra: Any) -> list[Any]:
+        """The factor of each plane, of the plane ones and of those within the penumbra."""
+        factors = [within_penumbra if rule.within_penumbra else wide for rule in rules]
+        return [dr.square(f) if rule.squared else f for f, rule in zip(factors, rules)]
+
+    totals = [type(plane.dx)(h0)] * 2
+    sums = [f * v for f, v in zip(each(h0, h0), values.at(-1), strict=True)]
+    for i, offset in enumerate(window(1)):
+        x = exponent(i, offset)
+        weights = exp2(x), exp2(nearer(x, offset))
+        sums = [dr.fma(w, v, s) for w, v, s in zip(each(*weights), values.at(i), sums)]
+        totals = [t + w for t, w in zip(totals, weights)]
+        values.next()
+    return [f * s for f, s in zip(each(*[1 / total for total in totals]), sums)]
+
+
+def footprint(falloff: Float | None, spacing: Float) -> Callable[[Float, Offset], Float]:
+    """Function of (x, offset): log2 x of a weight, less the more the farther a tap is.
+
+    falloff: `penumbra.footprint_falloff`, or None, which takes nothing off.
+    """
+    if falloff is None:
+        return lambda x, _: x
+    rate = falloff * dr.square(spacing)
+    return lambda x, offset: dr.fma(rate, -float(offset[0]**2 + offset[1]**2), x)
