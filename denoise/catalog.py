@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import partial
 from types import MappingProxyType
 from typing import Any, Protocol
 
@@ -30,9 +31,13 @@ from onespp.denoise.methods.parameters import renamed_parameters, with_present_n
 from onespp.denoise.methods.separable import BilateralSeparable
 from onespp.denoise.methods.svgf import Svgf
 from onespp.denoise.methods.temporal import Temporal
-from onespp.denoise.peers.table import PEERS
+from onespp.denoise.peers.oidn import Oidn, TemporalOidn
+from onespp.denoise.peers.optix import Optix
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
+from onespp.render.host import backend
+
+from .peers import oidn
 
 OUTLIERS = "+outliers"
 """Ends the name of a method before which outliers are removed."""
@@ -175,3 +180,31 @@ def _parse(key: str, text: str, kind: type) -> bool | int | float | str:
     except (KeyError, ValueError):
         expected = {bool: "true or false", int: "a whole number", float: "a number"}[kind]
         raise InputError(f"{key} is '{text}': use {expected}") from None
+
+
+@dataclass(frozen=True)
+class Peer:
+    """One denoiser: `make()` builds it with its defaults, `available()` says if it can run here."""
+
+    make: Callable[[], Any]
+    available: Callable[[], bool]
+    about: str
+
+
+def _has_cuda() -> bool:
+    return backend.choose() == "cuda"
+
+
+def _has_oidn() -> bool:
+    return oidn.AVAILABLE
+
+
+PEERS: Mapping[str, Peer] = MappingProxyType({
+    **{f"oidn-{quality}": Peer(partial(Oidn, quality), _has_oidn,
+                               f"Intel Open Image Denoise, quality {quality}, frame by frame.")
+       for quality in oidn.QUALITIES},
+    "temporal-oidn": Peer(TemporalOidn, _has_oidn, (TemporalOidn.__doc__ or "").splitlines()[0]),
+    "optix": Peer(Optix, _has_cuda, "NVIDIA's OptiX denoiser, frame by frame."),
+    "optix-temporal": Peer(partial(Optix, temporal=True), _has_cuda,
+                           "NVIDIA's OptiX denoiser with its last result."),
+})

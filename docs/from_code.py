@@ -21,10 +21,9 @@ import click
 from draw_architecture import imports, modules, rooms, rooms_table, svg
 
 from onespp import app
-from onespp.denoise.catalog import METHODS, build
+from onespp.denoise.catalog import METHODS, PEERS, build
 from onespp.denoise.methods.outliers import RemoveOutliers
 from onespp.denoise.metrics.table import MEASURES
-from onespp.denoise.peers.table import PEERS
 from onespp.denoise.score.causes import CAUSES, HISTORIES
 from onespp.render.channels import CHANNELS
 from onespp.scenes import catalog

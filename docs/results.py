@@ -26,9 +26,8 @@ import click
 import numpy as np
 
 import onespp  # noqa: F401 - finds LLVM before anything imports Dr.Jit
-from onespp.denoise.catalog import METHODS, Method, build, parameters
+from onespp.denoise.catalog import METHODS, PEERS, Method, build, parameters
 from onespp.denoise.metrics.tonemap import TONE_MAP
-from onespp.denoise.peers.table import PEERS
 from onespp.denoise.report.speed_error_plot import plot_speed_against_error
 from onespp.denoise.run.interleaved_timing import time_methods
 from onespp.denoise.run.sequence import denoise_sequence

@@ -23,12 +23,11 @@ import onespp.cli
 import onespp.denoise.studies.ablation
 import onespp.denoise.studies.lead
 import onespp.render.cli.bench
-from onespp.denoise.catalog import METHODS, build, parameters
+from onespp.denoise.catalog import METHODS, PEERS, build, parameters
 from onespp.denoise.methods.outliers import RemoveOutliers
 from onespp.denoise.methods.parameters import pairs
 from onespp.denoise.metrics.table import MEASURES
 from onespp.denoise.metrics.tonemap import srgb_from_linear
-from onespp.denoise.peers.table import PEERS
 from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
 

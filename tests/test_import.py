@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from onespp.denoise.catalog import build
-from onespp.denoise.peers.table import PEERS
+from onespp.denoise.catalog import PEERS, build
 from onespp.denoise.report.html import write_report
 from onespp.denoise.report.terminal import caption
 from onespp.denoise.score.sequence import score

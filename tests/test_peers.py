@@ -8,9 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from onespp.denoise.catalog import METHODS, build, parameters
+from onespp.denoise.catalog import METHODS, PEERS, build, parameters
 from onespp.denoise.peers import oidn
-from onespp.denoise.peers.table import PEERS
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.host import backend

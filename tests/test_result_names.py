@@ -7,10 +7,9 @@ import io
 import pytest
 from rich.console import Console
 
-from onespp.denoise.catalog import METHODS, build, changed, name_of
+from onespp.denoise.catalog import METHODS, PEERS, build, changed, name_of
 from onespp.denoise.cli.denoise import denoise_in
 from onespp.denoise.methods.atrous import Atrous
-from onespp.denoise.peers.table import PEERS
 from onespp.denoise.report.page_data import table_data
 from onespp.denoise.report.provenance import provenance
 from onespp.denoise.report.terminal import print_scores

@@ -102,7 +102,7 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
 def _what_to_know(sequence: Sequence, default: bool) -> Iterator[str]:
     """What a user may not know of these frames, a sentence each; `default`: of the method, too."""
     if default and not set(SPLIT) <= set(sequence.manifest.channels):
-        from onespp.denoise.peers.table import PEERS
+        from onespp.denoise.catalog import PEERS
 
         install = "" if all(PEERS[name].available() for name in BETTER_ON_PLAIN) else (
             ", with Open Image Denoise installed (pip install 'onespp[oidn]')")
@@ -162,9 +162,8 @@ def time_(folder: Path, methods: tuple[str, ...], frames: int, rounds: int, devi
 
 def _names(methods: tuple[str, ...]) -> list[str]:
     """The methods meant, `all` and `oidn` replaced by what they stand for."""
-    from onespp.denoise.catalog import METHODS
+    from onespp.denoise.catalog import METHODS, PEERS
     from onespp.denoise.peers.oidn import QUALITIES
-    from onespp.denoise.peers.table import PEERS
 
     groups = {"all": [*METHODS, *(name for name, peer in PEERS.items() if peer.available())],
               "oidn": [f"oidn-{quality}" for quality in QUALITIES]}
@@ -172,8 +171,7 @@ def _names(methods: tuple[str, ...]) -> list[str]:
 
 
 def _list(context: click.Context) -> None:
-    from onespp.denoise.catalog import METHODS, build, parameters
-    from onespp.denoise.peers.table import PEERS
+    from onespp.denoise.catalog import METHODS, PEERS, build, parameters
 
     about = {name: (method.__doc__ or "").splitlines()[0] for name, method in METHODS.items()}
     about.update({name: peer.about + ("" if peer.available() else " Not available here.")
