@@ -91,7 +91,8 @@ def compare(a: Path, b: Path, methods: tuple[str, ...], thresholds: tuple[str, .
 
     Change by change, with its standard error over the frames that both have.
     """
-    from onespp.denoise.score.compare import comparison, parse_thresholds, print_comparison
+    from onespp.denoise.report.comparison import print_comparison
+    from onespp.denoise.score.compare import comparison, parse_thresholds
     from onespp.denoise.score.scorecard import read_scores
 
     found = comparison(read_scores(a), read_scores(b), list(methods) or None,
