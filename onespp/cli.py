@@ -13,8 +13,11 @@ from click.core import ParameterSource
 
 import onespp.render.cli.render
 from onespp.denoise.cli.bench import bench
-from onespp.denoise.cli.denoise import DEFAULT_METHODS, denoise, denoise_in, time_
-from onespp.denoise.cli.score import compare, report, score, score_in
+from onespp.denoise.cli.compare import compare
+from onespp.denoise.cli.denoise import DEFAULT_METHODS, denoise, denoise_in
+from onespp.denoise.cli.report import report
+from onespp.denoise.cli.score import score, score_in
+from onespp.denoise.cli.time import time_
 from onespp.denoise.cli.tune import tune
 from onespp.render.cli.terminal import BAD_INPUT, Steps, progress
 from onespp.render.cli.terminal import run as run_command

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from onespp.denoise.catalog import parameters
-from onespp.denoise.studies.ablation import ablate, ablation, markdown, variants
+from onespp.denoise.cli.ablate import ablation
+from onespp.denoise.studies.ablation import ablate, markdown, variants
 from onespp.render.cli.terminal import run
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest

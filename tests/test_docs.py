@@ -53,7 +53,7 @@ TODAY = {
     "onespp.denoise.score.sequence", "onespp.denoise.metrics.table.table": "onespp.denoise.metrics.table",
     "onespp.render.files.sequence import FrameSequence":
     "onespp.render.files.sequence import Sequence as FrameSequence", "onespp.scenes": "scenes"}
-APART = {"lead": onespp.denoise.studies.lead.lead, "ablate": onespp.denoise.studies.ablation.ablation,
+APART = {"lead": onespp.denoise.cli.lead.lead, "ablate": onespp.denoise.cli.ablate.ablation,
          "bench render": onespp.render.cli.bench.bench}
 
 

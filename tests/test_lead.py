@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 from click.testing import CliRunner
 
+from onespp.denoise.cli.lead import lead
 from onespp.denoise.score.sequence import score
-from onespp.denoise.studies.lead import CAUSES, lead, markdown
+from onespp.denoise.studies.lead import CAUSES, markdown
 from onespp.render.errors import InputError
 
 from .report_sequence import make_report_sequence

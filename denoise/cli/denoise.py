@@ -131,35 +131,6 @@ def _denoise_externally(folder: Path, command: str, name: str) -> None:
                f"({run.first_ms:.0f} ms a frame, files included)")
 
 
-@click.command("time")
-@click.argument("folder", type=click.Path(path_type=Path))
-@click.option("--method", "methods", multiple=True, metavar="NAME", required=True,
-              help="As for `denoise`; give two or more. Ratios are to the first.")
-@click.option("--frames", type=click.IntRange(1), default=4, show_default=True, metavar="N",
-              help="Frames denoised in each round, the first ones of the sequence.")
-@click.option("--rounds", type=click.IntRange(1), default=5, show_default=True, metavar="N",
-              help="Rounds that count; one more goes before them.")
-@device_option
-@threads_option
-def time_(folder: Path, methods: tuple[str, ...], frames: int, rounds: int, device: str,
-          threads: int | None) -> None:
-    """Time methods in turns on the sequence in FOLDER; `score` then uses these times."""
-    use(device, threads)
-    from onespp.denoise.catalog import build
-    from onespp.denoise.run.interleaved_timing import time_methods
-
-    sequence = Sequence.open(folder)
-    chosen = {name: build(name) for name in _names(methods)}
-    with writing(folder, "time"), progress() as begin:
-        steps = begin("time", (rounds + 1) * min(frames, len(sequence.frames)))
-        times = time_methods(sequence, chosen, frames, rounds, steps.advance, command_line())
-    for name, t in times.methods.items():
-        click.echo(f"{name}: {t.ms:.1f} ms ({t.ms_quartiles[0]:.1f} to {t.ms_quartiles[1]:.1f}), "
-                   f"{t.ratio:.2f} times {times.ratio_to} ({t.ratio_quartiles[0]:.2f} to "
-                   f"{t.ratio_quartiles[1]:.2f}), first frame {t.first_ms:.0f} ms")
-    click.echo(f"medians and quartiles of {times.steps} steps; wrote {folder / 'times.json'}")
-
-
 def _names(methods: tuple[str, ...]) -> list[str]:
     """The methods meant, `all` and `oidn` replaced by what they stand for."""
     from onespp.denoise.catalog import METHODS, PEERS

@@ -9,19 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
-import click
-
 from onespp.denoise.catalog import Method, build, channels_read, parameters
+from onespp.denoise.cli.ablate import ablation
 from onespp.denoise.metrics.means import mean_over_frames
 from onespp.denoise.metrics.table import MEASURES
-from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.denoise.score.frame_truth import read_ground
 from onespp.denoise.score.scorer import Judge
-from onespp.render.cli.options import device_option, threads_option, use
-from onespp.render.cli.terminal import progress, run
+from onespp.render.cli.terminal import run
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import Sequence
 
@@ -97,31 +93,6 @@ def _cell(column: str, value: float | None, whole: float | None) -> str:
         return "-"
     text = format(value, MEASURES[column].format)
     return text if column != COLUMNS[0] or value == whole else f"{text} ({value - whole:+.2f})"
-
-
-@click.command()
-@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path),
-                metavar="DIR...")
-@click.option("--method", default="svgf", show_default=True, metavar="NAME")
-@device_option
-@threads_option
-def ablation(folders: tuple[Path, ...], method: str, device: str, threads: int | None) -> None:
-    """Print what each part of a method is worth on the sequences in DIR, as Markdown."""
-    use(device, threads)
-    methods, results, notes = variants(method), {}, []
-    with progress() as begin:
-        for folder in folders:
-            sequence = Sequence.open(folder)
-            steps = begin(f"ablation of {method} on {folder.name}", len(sequence.frames))
-            results[folder.name] = ablate(sequence, methods, steps.advance)
-            m = sequence.manifest
-            made = "imported" if m.direct is None else (
-                f"seed {m.seed}, --direct {m.direct} --sampler {m.sampler}")
-            notes.append(f"{folder.name}: {m.scene}, {len(m.frames)} frames of "
-                         f"{m.width}x{m.height}, {made}, "
-                         f"reference {m.reference_spp or 'of unknown'} spp")
-    click.echo(markdown(method, results))
-    click.echo("\n" + "; ".join(notes) + f"; means over frames, PSNR on {TONE_MAP}.")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,38 @@
+"""The command `ablate`: what each part of a method is worth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from onespp.denoise.metrics.tonemap import TONE_MAP
+from onespp.denoise.studies.ablation import ablate, markdown, variants
+from onespp.render.cli.options import device_option, threads_option, use
+from onespp.render.cli.terminal import progress
+from onespp.render.files.sequence import Sequence
+
+
+@click.command()
+@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path),
+                metavar="DIR...")
+@click.option("--method", default="svgf", show_default=True, metavar="NAME")
+@device_option
+@threads_option
+def ablation(folders: tuple[Path, ...], method: str, device: str, threads: int | None) -> None:
+    """Print what each part of a method is worth on the sequences in DIR, as Markdown."""
+    use(device, threads)
+    methods, results, notes = variants(method), {}, []
+    with progress() as begin:
+        for folder in folders:
+            sequence = Sequence.open(folder)
+            steps = begin(f"ablation of {method} on {folder.name}", len(sequence.frames))
+            results[folder.name] = ablate(sequence, methods, steps.advance)
+            m = sequence.manifest
+            made = "imported" if m.direct is None else (
+                f"seed {m.seed}, --direct {m.direct} --sampler {m.sampler}")
+            notes.append(f"{folder.name}: {m.scene}, {len(m.frames)} frames of "
+                         f"{m.width}x{m.height}, {made}, "
+                         f"reference {m.reference_spp or 'of unknown'} spp")
+    click.echo(markdown(method, results))
+    click.echo("\n" + "; ".join(notes) + f"; means over frames, PSNR on {TONE_MAP}.")

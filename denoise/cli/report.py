@@ -1,0 +1,32 @@
+"""The command `report`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from onespp.render.cli.terminal import command_line, named_progress
+from onespp.render.files.lock import writing
+from onespp.render.files.sequence import Sequence
+
+from .score import score_in
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--channels", metavar="NAMES",
+              help="Of the frames, as albedo,normal; default all. Fewer make a smaller folder.")
+def report(folder: Path, channels: str | None) -> None:
+    """Write a report of the scored sequence in FOLDER that opens in any browser."""
+    from onespp.denoise.report.html import write_report
+    from onespp.denoise.score.scorecard import read_scores
+
+    sequence = Sequence.open(folder)
+    if not (folder / "scores.json").exists():
+        score_in(folder)
+    names = channels and [name.strip() for name in channels.split(",") if name.strip()]
+    with writing(folder, "report"), named_progress() as tell:
+        page = write_report(sequence, read_scores(folder / "scores.json"), names or None, tell,
+                            command_line())
+    click.echo(f"wrote {page}: open it in a browser")
