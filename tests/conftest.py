@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import signal
-import sys
 from pathlib import Path
 
 import pytest
 
 from onespp.cli import app
 from onespp.render.cli.terminal import run as run_command
-
-sys.path.insert(0, str(Path(__file__).parent))
+from tests.support.places import GAMES202
 
 
 @pytest.fixture(scope="session")
 def games202() -> Path:
     """The assignment's real frames, which are not ours to ship."""
-    folder = Path(__file__).resolve().parents[2] / "shared/data/games202-box"
-    if not folder.is_dir():
+    if not GAMES202.is_dir():
         pytest.skip("the GAMES202 box frames are not in ../shared/data/games202-box")
-    return folder
+    return GAMES202
 
 
 @pytest.fixture

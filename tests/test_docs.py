@@ -30,9 +30,8 @@ from onespp.denoise.metrics.table import MEASURES
 from onespp.denoise.metrics.tonemap import srgb_from_linear
 from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
-
-from .report_sequence import make_report_sequence
-from .synthetic import make_frame, noisy
+from tests.support.frames import make_frame, noisy
+from tests.support.report_sequence import make_report_sequence
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"

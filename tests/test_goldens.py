@@ -16,8 +16,7 @@ from onespp.denoise.metrics.tonemap import bytes_from_linear
 from onespp.render.tracer.reference import Progress
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
-
-from .z_test import assert_same_mean
+from tests.support.statistics import assert_same_mean
 
 GOLDENS = Path(__file__).parent / "goldens"
 HEIGHT, WIDTH, GOLDEN_SPP, SPP = 24, 32, 2048, 256

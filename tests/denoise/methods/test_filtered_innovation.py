@@ -1,0 +1,236 @@
+"""The filtered innovation against float64, its signals, and how it follows a change of light."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from onespp.denoise.inputs.color import read_color
+from onespp.denoise.inputs.signals import USED, read_signals
+from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.methods import base as lanes
+from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
+from onespp.render.errors import InputError
+from tests.support import innovation_oracle
+from tests.support.frames import make_frame, noisy, translation, with_images
+from tests.support.recordings import compiled, taking_turns
+
+from .test_svgf import moving
+
+
+def run(method, frames):
+    image, state = method(frames[0], method.init(frames[0].height, frames[0].width))
+    for frame in frames[1:]:
+        image, state = method(frame, state)
+    return image, state
+
+
+def with_shadow_rays(frame, seed=0, light=(1.0, -3.0, 1.0)):
+    """The frame with shadow rays to two lights of a size, of which the board (object 1) stops two
+    in five."""
+    rng = np.random.default_rng(seed)
+    there = frame["id"] >= 0
+    lights = rng.choice([-1, 0], there.shape)
+    points = light + rng.normal(0, 0.3, (*there.shape, 3)) * (2 + lights[..., None])
+    toward = np.where(there[..., None], points - frame["position"], 0)
+    stopped = there & (rng.random(there.shape) < 0.4)
+    distance = np.linalg.norm(toward, axis=-1) * rng.uniform(0.3, 0.6, there.shape)
+    return with_images(frame, light=toward, light_id=lights,
+                       blocker_distance=np.where(stopped, distance, 0),
+                       blocker_id=np.where(stopped, 1, -1))
+
+
+def with_neighbour(frame):
+    """The frame with the right part of its wall as an object of its own, number 2."""
+    right = (frame["id"] == 0) & (frame["position"][..., 0] > 0.5)
+    return replace(with_images(frame, id=np.where(right, 2, frame["id"])),
+                   world_from_object=np.concatenate([frame.world_from_object,
+                                                     frame.world_from_object[:1]]))
+
+
+def split(height, width, count=3):
+    """Moving frames with all channels that the method uses, a lamp, and three objects."""
+    frames = []
+    for i, frame in enumerate(moving(height, width, count)):
+        rng = np.random.default_rng(100 + i)
+        there = frame["id"][..., None] >= 0
+        albedo = frame["albedo"].copy()
+        albedo[:height // 3, :width // 4] = 0
+        unshadowed = np.where(there, albedo * [1.0, 0.8, 0.6] * rng.uniform(0.5, 1, (1, 1, 3)), 0)
+        visibility = (rng.random((height, width)) < 0.6) * rng.gamma(4, 0.3, (height, width))
+        direct = unshadowed * visibility[..., None] * rng.uniform(0.9, 1.1, (1, 1, 3))
+        specular = 0.3 * frame["indirect"] * rng.random((height, width, 1))
+        color = frame["emission"] + direct + frame["indirect"]
+        frame = with_images(frame, albedo=albedo, unshadowed=unshadowed, color=color,
+                            visibility=visibility, direct=direct, specular=specular)
+        frames.append(with_neighbour(with_shadow_rays(frame, i)))
+    return frames
+
+
+@pytest.mark.parametrize("shadows", [True, False])
+@pytest.mark.parametrize(("height", "width", "levels", "sharp_levels"), [
+    (19, 26, 4, 2), (7, 5, 4, 2), (1, 9, 4, 2), (9, 70, 7, 6), (12, 9, 6, 3)])
+def test_it_is_the_formula_in_float64(height, width, levels, sharp_levels, shadows):
+    frames = split(height, width)
+    method = FilteredInnovation(
+        innovation_levels=levels, output_levels=3, sharp_innovation_levels=sharp_levels,
+        sharp_output_levels=2, follow_shadows=shadows)
+    image, _ = run(method, frames)
+    expected = innovation_oracle.run(frames, method)
+    np.testing.assert_allclose(image, expected, rtol=1e-3, atol=5e-5)
+
+
+def test_it_is_the_formula_where_light_falls_on_a_texture_and_debts_are_paid(monkeypatch):
+    """Stripes are in the light here, as where albedo is not known; the last frame is dark."""
+    frames = split(19, 26, 4)
+    for i, frame in enumerate(frames):
+        light = np.where(np.arange(26) // 3 % 2, 1, 0.02)[:, None] * (1 if i < 3 else 0.1)
+        images = {name: light * frame[name] for name in ("direct", "indirect", "unshadowed")}
+        specular, emission = light * frame["specular"], np.zeros((19, 26, 3))
+        frames[i] = with_images(frame, **images, specular=specular, emission=emission,
+                                color=images["direct"] + images["indirect"])
+    method = FilteredInnovation(smoothing=4, levels=3, sharp_smoothing=2, sharp_levels=2)
+    image, _ = run(method, frames)
+    np.testing.assert_allclose(image, innovation_oracle.run(frames, method), rtol=1e-3, atol=5e-5)
+    assert image.min() == 0
+    monkeypatch.setattr(lanes, "repay", lambda image, id_: image)
+    signed, _ = run(method, frames)
+    assert (signed < -1e-3).sum() > 50
+    assert image.sum() == pytest.approx(signed.sum(), rel=1e-5)
+
+
+def test_the_signals_add_up_to_the_colour():
+    (frame,) = split(9, 14, 1)
+    stencil = Stencil(9, 14, 1)
+    for names in ((), ("specular",), ("unshadowed",), ("specular", "visibility"),
+                  ("direct", "specular"), ("albedo",), ("albedo", "emission")):
+        images = {k: v for k, v in frame.images.items() if k not in names}
+        some = with_images(type(frame)(frame.index, images, frame.camera_from_world,
+                                       frame.screen_from_world, frame.world_from_object))
+        for gloss in (True, False):
+            signals = read_signals(some, read_color(some, stencil), stencil, True, gloss)
+            expected = frame["color"]
+            if "emission" in names:
+                expected = expected - frame["emission"]
+            np.testing.assert_allclose(stencil.image(signals.color(signals.listed)), expected,
+                                       rtol=1e-4, atol=1e-5)
+
+
+def test_it_follows_a_change_of_light_at_once_where_plain_accumulation_lags():
+    """A wall that turns three times as bright: the next frame's mean is the new one."""
+    wall = make_frame(32, 32, wall_end=1e9)
+
+    def lit(level, seed):
+        noise = np.random.default_rng(seed).normal(0, 0.3, (32, 32, 1))
+        return with_images(wall, color=np.full((32, 32, 3), level) + noise * level)
+
+    frames = [lit(1.0, i) for i in range(12)] + [lit(3.0, 99)]
+    method = FilteredInnovation(demodulate=False)
+    before, state = run(method, frames[:-1])
+    after, _ = method(frames[-1], state)
+    assert before[8:-8, 8:-8].mean() == pytest.approx(1, rel=0.02)
+    assert after[8:-8, 8:-8].mean() == pytest.approx(3, rel=0.03)
+
+
+def test_history_lowers_the_error_of_a_still_scene_below_that_of_single_frames():
+    truth = make_frame(32, 40)
+    frames = [noisy(truth, seed=i) for i in range(10)]
+    method = FilteredInnovation(demodulate=False)
+    error = [np.square(image - truth["color"]).mean() for image in
+             (run(method, frames[-1:])[0], run(method, frames)[0])]
+    assert error[1] < 0.7 * error[0]
+
+
+def test_energy_is_kept():
+    frames = split(33, 41, 4)
+    image, _ = run(FilteredInnovation(), frames)
+    assert image.mean() == pytest.approx(frames[-1]["color"].mean(), rel=0.01)
+
+
+def test_visibility_above_its_cap_is_not_lost():
+    (frame,) = split(24, 24, 1)
+    visibility = frame["visibility"].copy()
+    visibility[5, 5] = 50
+    burst = with_images(frame, visibility=visibility,
+                        direct=frame["unshadowed"] * visibility[..., None],
+                        color=frame["emission"] + frame["indirect"]
+                        + frame["unshadowed"] * visibility[..., None])
+    stencil = Stencil(24, 24, 1)
+    signals = read_signals(burst, read_color(burst, stencil), stencil, True, True)
+    assert stencil.image([signals.listed[-1].luminance]).max() <= 2
+    np.testing.assert_allclose(stencil.image(signals.color(signals.listed)), burst["color"],
+                               rtol=1e-4, atol=1e-5)
+
+
+def test_a_lamp_and_what_is_around_it_do_not_mix():
+    """The lamp reflects nothing; its neighbours, of the same plane, must not take its darkness."""
+    wall = make_frame(24, 24, wall_end=1e9)
+    there = (wall["id"] == 0)[..., None]
+    albedo = np.where(there, [0.5] * 3, 0.5)
+    albedo[8:16, :6] = 0
+    emission = np.where(albedo == 0, 4.0, 0.0)
+    light = np.where(albedo > 0, albedo * 2.0, 0)
+    frame = with_images(wall, albedo=albedo, emission=emission, direct=0 * light, indirect=light,
+                        color=light + emission)
+    image, _ = run(FilteredInnovation(), [frame, frame])
+    np.testing.assert_allclose(image, frame["color"], rtol=1e-4)
+
+
+def test_a_moving_object_and_its_background_keep_histories_of_their_own():
+    def painted(i):
+        frame = make_frame(24, 32, index=i, board=translation(0.2 * i, 0, 0), wall_end=1e9)
+        return with_images(frame, color=np.where((frame["id"] == 1)[..., None], [4.0] * 3, 1.0))
+
+    frames = [painted(i) for i in range(5)]
+    image, _ = run(FilteredInnovation(demodulate=False), frames)
+    np.testing.assert_allclose(image, frames[-1]["color"], rtol=2e-2)
+
+
+def test_five_frames_are_one_recording_and_parameters_compile_nothing():
+    frames = split(16, 20, 5)
+    run(FilteredInnovation(), frames)
+    other = FilteredInnovation(light_alpha=0.1, visibility_sigma=3.0, fade_frames=3.0, penumbra=2.0,
+                               sigma_plane=0.02, max_history_length=9.0, plane_tolerance=0.03)
+    assert compiled(lambda: run(other, frames)) == 0
+    _, state = run(FilteredInnovation(), frames)
+    passes = state.passes
+    steps = [passes.follow_shadows, passes.innovations, passes.merge, passes.pack,
+             *(level.step for level in (passes.spread, *passes.smoothing, *passes.output))]
+    assert [step.recordings for step in steps] == [1] * len(steps)
+
+
+def test_glossy_light_is_renewed_by_no_change_where_there_is_no_visibility():
+    names = ("visibility", "unshadowed")
+    frames = [replace(f, images={k: v for k, v in f.images.items() if k not in names})
+              for f in split(16, 20, 3)]
+    one, other = (run(FilteredInnovation(change_alpha=share), frames)[0] for share in (0.0, 1.0))
+    np.testing.assert_array_equal(one, other)
+
+
+def test_two_threads_give_what_one_gives():
+    frames = split(21, 18)
+    one, two = taking_turns(lambda: run(FilteredInnovation(), frames)[0])
+    np.testing.assert_array_equal(one, two)
+
+
+def test_other_channels_halfway_are_refused():
+    frames = split(8, 8, 2)
+    method = FilteredInnovation()
+    _, state = method(frames[0], method.init(8, 8))
+    plain = type(frames[1])(1, {k: v for k, v in frames[1].images.items() if k not in USED},
+                            frames[1].camera_from_world, frames[1].screen_from_world,
+                            frames[1].world_from_object)
+    with pytest.raises(InputError, match="other channels"):
+        method(plain, state)
+
+
+@pytest.mark.parametrize("settings", [
+    {"output_levels": 0}, {"output_levels": 2.0}, {"sharp_output_levels": 5},
+    {"sharp_innovation_levels": 1}, {"light_alpha": 0.0}, {"visibility_sigma": -1.0},
+    {"max_history_length": 0.0}, {"min_gain": 0.0}, {"noise_threshold": -1.0}, {"penumbra": 0.0},
+    {"fade_frames": 0.0}, {"sharp_min_gain": 0.0}, {"change_alpha": 2.0}])
+def test_bad_parameters_are_refused(settings):
+    with pytest.raises(InputError, match=next(iter(settings))):
+        FilteredInnovation(**settings)

@@ -1,0 +1,164 @@
+"""Denoisers of others: fed what ours are fed, refused in one sentence where they are missing."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from onespp.denoise.catalog import METHODS, PEERS, build, parameters
+from onespp.denoise.peers import oidn
+from onespp.render.errors import InputError
+from onespp.render.frame import Frame
+from onespp.render.host import backend
+from tests.support.frames import make_frame, noisy, with_images
+
+H, W = 40, 48
+
+needs_oidn = pytest.mark.skipif(not oidn.AVAILABLE, reason="pyoidn is not installed")
+each = pytest.mark.parametrize("name", ["oidn-fast", "temporal-oidn"])
+
+
+def run(name, *frames, **settings):
+    method = build(name, settings)
+    state = method.init(frames[0].height, frames[0].width)
+    for frame in frames:
+        image, state = method(frame, state)
+    return image
+
+
+def without(frame, *channels):
+    images = {k: v for k, v in frame.images.items() if k not in channels}
+    return Frame(frame.index, images, frame.camera_from_world, frame.screen_from_world,
+                 frame.world_from_object)
+
+
+def test_peers_have_names_of_their_own_and_build_without_what_they_need(monkeypatch):
+    monkeypatch.setattr(oidn, "AVAILABLE", False)
+    assert not {*METHODS} & {*PEERS}
+    for name in PEERS:
+        assert parameters(build(name))
+        assert PEERS[name].about.endswith(".")
+    assert {parameters(build(f"oidn-{q}"))["quality"] for q in oidn.QUALITIES} == {*oidn.QUALITIES}
+
+
+def test_without_the_package_a_sentence_says_how_to_get_it(monkeypatch):
+    monkeypatch.setattr(oidn, "AVAILABLE", False)
+    assert not PEERS["oidn-high"].available()
+    with pytest.raises(InputError, match=r"pip install pyoidn"):
+        build("oidn-high").init(4, 4)
+
+
+def test_without_cuda_optix_says_so_in_one_line(monkeypatch):
+    monkeypatch.setattr(backend, "choose", lambda device="auto": "llvm")
+    for name in ("optix", "optix-temporal"):
+        assert not PEERS[name].available()
+        with pytest.raises(InputError, match="needs a CUDA device") as error:
+            build(name).init(4, 4)
+        assert "\n" not in str(error.value)
+
+
+def test_no_peer_brings_in_mitsuba_before_it_is_used():
+    code = ("import sys, onespp.denoise.catalog; "
+            "sys.exit('mitsuba' in sys.modules or 'pyoidn' in sys.modules)")
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(("settings", "words"), [
+    ({"quality": "best"}, "quality is 'best': use high, balanced, fast"),
+    ({"auxiliary": "some"}, "auxiliary is 'some': use clean, noisy"),
+    ({"radius": "3"}, "has no parameter 'radius': it has quality")])
+def test_bad_settings_are_explained(settings, words):
+    with pytest.raises(InputError, match=words):
+        build("oidn-high", settings)
+
+
+def test_words_are_parameters_like_numbers():
+    method = build("oidn-high", {"quality": "fast", "auxiliary": "noisy"})
+    assert parameters(method)["quality"] == "fast"
+    assert parameters(method)["auxiliary"] == "noisy"
+
+
+@needs_oidn
+@each
+def test_noise_goes_and_the_picture_stays(name):
+    clean = make_frame(H, W, wall_end=1e9)
+    result = run(name, *(noisy(clean, seed=i) for i in range(3)))
+    assert result.shape == (H, W, 3)
+    assert result.dtype == np.float32
+    before = np.mean((noisy(clean, seed=2)["color"] - clean["color"])**2)
+    assert np.mean((result - clean["color"])**2) < 0.2 * before
+
+
+@needs_oidn
+def test_qualities_and_modes_are_not_the_same():
+    frame = noisy(make_frame(H, W))
+    images = [run("oidn-high", frame), run("oidn-fast", frame),
+              run("oidn-fast", frame, auxiliary="noisy"),
+              run("oidn-fast", without(frame, "albedo"))]
+    for i, a in enumerate(images):
+        for b in images[:i]:
+            assert np.abs(a - b).max() > 1e-4
+
+
+@needs_oidn
+def test_a_frame_does_not_depend_on_the_one_before():
+    a, b = noisy(make_frame(H, W)), noisy(make_frame(H, W), seed=5)
+    bare = without(b, "albedo")
+    np.testing.assert_array_equal(run("oidn-fast", a, bare, b), run("oidn-fast", b))
+
+
+@needs_oidn
+@each
+def test_a_lamp_keeps_its_edge(name):
+    frame = noisy(make_frame(H, W, wall_end=1e9))
+    emission = np.zeros((H, W, 3), np.float32)
+    emission[10:20, 10:30] = 30.0
+    lit = with_images(frame, emission=emission, color=frame["color"] + emission)
+    dark = with_images(frame, emission=0 * emission)
+    np.testing.assert_allclose(run(name, lit) - emission, run(name, dark), atol=1e-3)
+    bled = np.abs(run(name, lit, emission_apart="no") - emission - run(name, dark))
+    assert bled.max() > 0.01
+
+
+@needs_oidn
+@each
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_bad_pixels_are_repaired_before_the_network_sees_them(name, bad):
+    frame = noisy(make_frame(H, W))
+    color, normal, albedo = (np.array(frame[c]) for c in ("color", "normal", "albedo"))
+    color[7, 7, 1] = normal[20, 9, 0] = albedo[3, 4] = bad
+    emission = np.zeros_like(color)
+    emission[5, 5] = bad
+    broken = with_images(frame, color=color, normal=normal, albedo=albedo, emission=emission)
+    result = run(name, frame, broken)
+    assert np.isfinite(result).all()
+    changed = np.abs(result - run(name, frame, frame)).max(axis=-1) > 0.2
+    assert changed.sum() <= 4  # those with bad guides, if any
+
+
+@needs_oidn
+def test_a_guide_that_is_not_finite_counts_as_white_or_as_no_normal():
+    frame = noisy(make_frame(H, W))
+    albedo, normal = np.array(frame["albedo"]), np.array(frame["normal"])
+    albedo[3:9, 4:9], normal[20:25, 9:14] = np.nan, np.inf
+    broken = with_images(frame, albedo=albedo, normal=normal)
+    albedo[3:9, 4:9], normal[20:25, 9:14] = 1, 0
+    told = with_images(frame, albedo=albedo, normal=normal)
+    np.testing.assert_array_equal(run("oidn-fast", broken), run("oidn-fast", told))
+
+
+@needs_oidn
+@each
+def test_missing_channels_and_other_sizes_are_named(name):
+    frame = make_frame(H, W)
+    for channel in ("color", "normal", "id"):
+        with pytest.raises(InputError, match=f"lacks the channel '{channel}'"):
+            run(name, without(frame, channel))
+    method = build(name)
+    with pytest.raises(InputError, match=r"48x40.*48x41"):
+        method(frame, method.init(H + 1, W))
+    with pytest.raises(InputError, match="empty"):
+        method.init(0, 7)

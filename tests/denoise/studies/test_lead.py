@@ -1,0 +1,49 @@
+"""The table of how far a method is ahead of a peer."""
+
+from __future__ import annotations
+
+import pytest
+from click.testing import CliRunner
+
+from onespp.denoise.cli.lead import lead
+from onespp.denoise.score.sequence import score
+from onespp.denoise.studies.lead import CAUSES, markdown
+from onespp.render.errors import InputError
+from tests.support.report_sequence import make_report_sequence
+
+
+@pytest.fixture(scope="module")
+def scores(tmp_path_factory):
+    sequence = make_report_sequence(tmp_path_factory.mktemp("lead") / "made")
+    return score(sequence, pictures=False), sequence.folder
+
+
+def test_the_lead_is_the_difference_of_the_scores(scores):
+    found, _ = scores
+    text = markdown("fine", "rough", {"made": (found, found)})
+    fine, rough = (found.methods[name] for name in ("fine", "rough"))
+    ahead = fine["psnr_srgb"] - rough["psnr_srgb"]
+    assert ahead > 1
+    assert f"| mean PSNR over the peer on plain input, dB | {ahead:+.2f} |" in text
+    worst = min(a["psnr_srgb"] - b["psnr_srgb"]
+                for a, b in zip(fine.per_frame[1:], rough.per_frame[1:]))
+    assert f"| the same, worst frame after the first, dB | {worst:+.2f} |" in text
+    assert f"| flicker, share of the peer's | {fine['flicker'] / rough['flicker']:.2f} |" in text
+    assert all(cause in text for cause in CAUSES)
+
+
+def test_a_method_is_not_ahead_of_itself(scores):
+    text = markdown("fine", "fine", {"made": (scores[0], scores[0])})
+    assert text.count("+0.00") >= 4
+
+
+def test_what_is_missing_is_named(scores):
+    found, folder = scores
+    with pytest.raises(InputError, match="lack 'magic'"):
+        markdown("magic", "rough", {"made": (found, found)})
+    result = CliRunner().invoke(lead, [str(folder)])
+    assert isinstance(result.exception, InputError)
+    result = CliRunner().invoke(lead, [str(folder), str(folder), "--method", "fine", "--peer",
+                                       "rough"])
+    assert result.exit_code == 0
+    assert "made: 4 frames" in result.output

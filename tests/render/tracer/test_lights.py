@@ -1,0 +1,77 @@
+"""Resampled direct light, and samples with blue-noise error. (Bias: see test_path.py.)"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from onespp.render.channels import FRAME, SPLIT
+from onespp.render.errors import InputError
+from onespp.render.tracer.renderer import Renderer
+from onespp.scenes import catalog
+from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
+
+from .test_renderer import small_scene
+
+
+@pytest.mark.parametrize("name", ["box", "room"])
+def test_unshadowed_light_has_no_noise(name):
+    renderer = Renderer(catalog.load(name), 12, 16, direct="resampled")
+    a, b = (renderer.frame(2, seed, SPLIT)["unshadowed"] for seed in (0, 1))
+    assert a.max() > 0.1
+    np.testing.assert_allclose(a, b, rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["box", "room"])
+def test_visibility_times_unshadowed_light_has_the_mean_of_direct_light(name):
+    renderer = Renderer(catalog.load(name), 16, 24, direct="resampled")
+    frames = [renderer.frame(2, seed, ("direct", *SPLIT)) for seed in range(200)]
+    product = [blocks(f["visibility"][..., None] * f["unshadowed"], 8).mean(-1) for f in frames]
+    direct = [blocks(f["direct"], 8).mean(-1) for f in frames]
+    # The colour of several lights is mixed by luminance in the product: allow 3 % beside chance.
+    mean, variance = mean_and_variance(product)
+    other, other_variance = mean_and_variance(direct)
+    assert_same_mean(mean, variance + (0.03 * other) ** 2, other, other_variance)
+
+
+@pytest.mark.parametrize(("name", "gain"), [("box", 3), ("room", 4)])
+def test_resampling_lowers_the_variance_of_direct_light(name, gain):
+    variance = {direct: np.var([renderer.frame(2, seed, ("direct",))["direct"]
+                                for seed in range(60)], axis=0).mean()
+                for direct in ("mis", "resampled")
+                for renderer in [Renderer(catalog.load(name), 24, 32, direct=direct)]}
+    assert variance["mis"] > gain * variance["resampled"]
+
+
+@pytest.mark.parametrize("sampler", ["zsobol", "bluenoise"])
+def test_blue_noise_samplers_put_the_error_at_high_frequencies(sampler):
+    """Over the frames of many seeds, blocks of 4x4 pixels average to less error than with PCG."""
+    def error(sampler: str, size: int) -> float:
+        renderer = Renderer(small_scene(), 32, 32, sampler=sampler)
+        frames = [renderer.frame(0, seed, ("color",))["color"] for seed in range(48)]
+        lit = small_scene().object_names.index("floor")
+        floor = blocks((renderer.frame(0, 0, ("id",))["id"] == lit)[..., None] * 1.0, size) == 1
+        assert floor.sum() > 5
+        return np.var([blocks(f, size) for f in frames], axis=0)[floor[..., 0]].mean()
+
+    assert error(sampler, 1) == pytest.approx(error("pcg", 1), rel=0.1)
+    assert error(sampler, 4) < 0.5 * error("pcg", 4)
+
+
+def test_other_frames_and_seeds_are_scrambled_anew():
+    renderer = Renderer(small_scene(), 32, 32, direct="resampled", sampler="zsobol")
+    images = [renderer.frame(0, seed, ("indirect",))["indirect"] for seed in (0, 1, 2)]
+    first, second = images[0] - images[2], images[1] - images[2]
+    # Independent images share their common subtrahend alone: a correlation of one half.
+    assert np.corrcoef(first.ravel(), second.ravel())[0, 1] == pytest.approx(0.5, abs=0.15)
+
+
+def test_unknown_options_are_refused():
+    for option in ("direct", "sampler"):
+        with pytest.raises(InputError, match=f"--{option} 'magic'"):
+            Renderer(small_scene(), 4, 4, **{option: "magic"})
+
+
+def test_the_plain_estimator_has_no_split():
+    with pytest.raises(InputError, match="resampled"):
+        Renderer(small_scene(), 4, 4).frame(0, channels=(*FRAME, *SPLIT))

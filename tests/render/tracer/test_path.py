@@ -1,0 +1,71 @@
+"""The path tracer is unbiased: against closed forms, and against Mitsuba's own `path`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from onespp.render.mitsuba.variant import mi
+from onespp.render.tracer.renderer import Renderer
+from onespp.scenes import catalog
+from tests.support.furnace import furnace
+from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
+
+ALBEDO, EMISSION, DEPTH = 0.6, 0.8, 5
+
+
+@pytest.mark.parametrize("max_depth", [1, 2, DEPTH])
+def test_furnace_has_the_radiance_of_the_closed_form(max_depth):
+    renderer = Renderer(furnace(ALBEDO, EMISSION, max_depth), 8, 8)
+    frames = [renderer.frame(0, seed) for seed in range(200)]
+    terms = [EMISSION * ALBEDO**k for k in range(max_depth)]
+    expected = {"emission": terms[0], "direct": sum(terms[1:2]), "indirect": sum(terms[2:]),
+                "color": sum(terms)}
+    for channel, value in expected.items():
+        mean, variance = mean_and_variance([frame[channel] for frame in frames])
+        assert_same_mean(mean, variance, value)
+
+
+def test_furnace_far_from_the_origin_looks_the_same():
+    near, far = (Renderer(furnace(ALBEDO, EMISSION, DEPTH, at), 8, 8).frame(0)
+                 for at in ((0, 0, 0), (2.0**20, -(2.0**20), 2.0**20)))
+    for name in ("color", "depth", "normal", "id"):
+        np.testing.assert_allclose(far[name], near[name], rtol=1e-4, atol=1e-5, err_msg=name)
+
+
+@pytest.mark.parametrize("name", ["box", "room", "furnace"])
+def test_samples_have_the_mean_of_mitsubas_path(name):
+    """Box-filtered, since Mitsuba jitters its camera rays."""
+    scene = furnace(ALBEDO, EMISSION, DEPTH) if name == "furnace" else catalog.load(name)
+    height, width, frame, spp, replicates = 16, 24, 7, 16, 64
+    renderer = Renderer(scene, height, width)
+    ours = [renderer.sample_sum(frame, 0, k, spp, antialias=True) / spp
+            for k in range(replicates)]
+    path = mi.load_dict({"type": "path", "max_depth": scene.max_depth, "rr_depth": 1000})
+    sensor = renderer.stage.sensor(height, width)
+    theirs = [mi.render(renderer.stage.mi_scene, sensor=sensor, integrator=path, spp=spp,
+                        seed=k).numpy() for k in range(replicates)]
+    a, b = ([blocks(image, 4) for image in images] for images in (ours, theirs))
+    assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
+
+
+@pytest.mark.parametrize(("name", "direct", "sampler"), [
+    ("box", "mis", "pcg"), ("box", "mis", "zsobol"), ("box", "resampled", "pcg"),
+    ("room", "mis", "pcg"), ("room", "resampled", "zsobol"), ("furnace", "resampled", "zsobol"),
+    ("box", "mis", "bluenoise"), ("room", "resampled", "bluenoise")])
+def test_frames_at_one_sample_have_the_mean_of_the_reference(name, direct, sampler):
+    height, width, frame = 16, 20, 3
+    scene = furnace(ALBEDO, EMISSION, DEPTH) if name == "furnace" else catalog.load(name)
+    renderer = Renderer(scene, height, width, direct=direct, sampler=sampler)
+    ours = [renderer.frame(frame, seed, ("color",))["color"] for seed in range(160)]
+    reference = [renderer.sample_sum(frame, 9, k, 16) / 16 for k in range(32)]
+    a, b = ([blocks(image, 2) for image in images] for images in (ours, reference))
+    assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
+
+
+def test_radiance_splits_add_up_to_the_color():
+    frame = Renderer(catalog.load("box"), 24, 24).frame(2)
+    total = frame["emission"] + frame["direct"] + frame["indirect"]
+    np.testing.assert_allclose(frame["color"], total, rtol=1e-6)
+    for channel in ("emission", "direct", "indirect"):
+        assert frame[channel].max() > 0, channel
