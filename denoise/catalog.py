@@ -31,8 +31,9 @@ from onespp.denoise.methods.parameters import renamed_parameters, with_present_n
 from onespp.denoise.methods.separable import BilateralSeparable
 from onespp.denoise.methods.svgf import Svgf
 from onespp.denoise.methods.temporal import Temporal
-from onespp.denoise.peers.oidn import Oidn, TemporalOidn
+from onespp.denoise.peers.oidn import Oidn
 from onespp.denoise.peers.optix import Optix
+from onespp.denoise.peers.temporal_oidn import TemporalOidn
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.host import backend

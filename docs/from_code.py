@@ -20,7 +20,7 @@ from typing import Any
 import click
 from draw_architecture import imports, modules, rooms, rooms_table, svg
 
-from onespp import app
+from onespp.cli import app
 from onespp.denoise.catalog import METHODS, PEERS, build
 from onespp.denoise.methods.outliers import RemoveOutliers
 from onespp.denoise.metrics.table import MEASURES
@@ -218,7 +218,10 @@ def walk(group: click.Group, before: str = "") -> list[tuple[str, click.Command]
     found: list[tuple[str, click.Command]] = []
     for name, command in group.commands.items():
         path = f"{before} {name}".strip()
-        found += walk(command, path) if isinstance(command, click.Group) else [(path, command)]
+        if not isinstance(command, click.Group) or command.invoke_without_command:
+            found.append((path, command))
+        if isinstance(command, click.Group):
+            found += walk(command, path)
     return found
 
 

@@ -44,7 +44,7 @@ from onespp.render.cli.terminal import run as run_command
 from onespp.render.errors import InputError
 from onespp.render.files.frame_ranges import format_frames, parse_frames
 from onespp.render.files.lock import writing
-from onespp.render.files.sequence import Sequence as FrameSequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.files.times import read_times
 from onespp.render.job import RenderJob, render_sequence
 from onespp.scenes import catalog
@@ -208,7 +208,7 @@ def timed(sequence: FrameSequence, methods: Mapping[str, Method]) -> bool:
 def scores_in(folder: Path) -> Scores:
     say(f"{folder.name}: score")
     with writing(folder, "score"):
-        return score(FrameSequence.open(folder), pictures=False)
+        return score(FrameSequence.open(folder))
 
 
 def scores_of(sequence: FrameSequence) -> Scores:

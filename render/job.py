@@ -13,11 +13,10 @@ import numpy as np
 
 from onespp.render.files.json_file import checked
 from onespp.render.files.manifest import Manifest, first_difference
-from onespp.render.files.sequence import Sequence as FrameSequence
-from onespp.render.files.sequence import another
+from onespp.render.files.sequence import FrameSequence, another
 from onespp.render.host.machine import machine
 from onespp.render.host.versions import versions
-from onespp.render.tracer.reference import Progress, pass_sizes, render_reference
+from onespp.render.tracer.reference import SampleSums, pass_sizes, render_reference
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Scene
 from onespp.scenes.fingerprint import fingerprint, later_fingerprints
@@ -148,7 +147,7 @@ def _check_later_frames(job: RenderJob, folder: Path, manifest: Manifest) -> Non
 
 def kept_references(sequence: FrameSequence, frames: Sequence[int], spp: int) -> str:
     """A sentence about references that have more samples than asked for; "" if there are none."""
-    better = [found for i in frames if (found := sequence.reference_spp(i)) > spp]
+    better = [found for i in frames if (found := sequence.reference_spp(i) or 0) > spp]
     if not better:
         return ""
     fewest, most = min(better), max(better)
@@ -161,7 +160,7 @@ def _has_reference(sequence: FrameSequence, index: int, job: RenderJob) -> bool:
     """Whether a frame has a reference as good as asked for, or better."""
     spp = job.reference_spp or 0
     try:
-        return sequence.has_reference(index) and sequence.reference_spp(index) >= spp
+        return sequence.has_reference(index) and (sequence.reference_spp(index) or 0) >= spp
     except InputError:  # damaged: it is made again
         return False
 
@@ -174,10 +173,10 @@ def _render_reference(job: RenderJob, sequence: FrameSequence, index: int,
     known = [progress for progress in (_saved_progress(job, sequence, index),
                                        _smaller_reference(job, sequence, index)) if progress]
     progress = max(known, key=lambda progress: progress.samples,
-                   default=Progress.start(job.height, job.width))
+                   default=SampleSums.start(job.height, job.width))
     saved = time.monotonic()
 
-    def after_pass(progress: Progress) -> None:
+    def after_pass(progress: SampleSums) -> None:
         nonlocal saved
         report(progress.samples / spp)
         if time.monotonic() - saved > SECONDS_BETWEEN_SAVES:
@@ -200,14 +199,15 @@ def _render_reference(job: RenderJob, sequence: FrameSequence, index: int,
     sequence.remove_partial(index)
 
 
-def _save_progress(job: RenderJob, sequence: FrameSequence, index: int, progress: Progress) -> None:
+def _save_progress(job: RenderJob, sequence: FrameSequence, index: int,
+                   progress: SampleSums) -> None:
     sequence.write_partial(index, {
         "total": progress.total, "squares": progress.squares, "passes": progress.passes,
         "samples": progress.samples, "spp": job.reference_spp or 0, "antialias": job.antialias})
 
 
-def _saved_progress(job: RenderJob, sequence: FrameSequence, index: int) -> Progress | None:
-    """Progress of an interrupted run, if this job can go on from it, or needs no more."""
+def _saved_progress(job: RenderJob, sequence: FrameSequence, index: int) -> SampleSums | None:
+    """Sums of an interrupted run, if this job can go on from it, or needs no more."""
     saved = sequence.read_partial(index)
     if saved is None or saved.keys() != _SAVED:
         return None
@@ -217,7 +217,7 @@ def _saved_progress(job: RenderJob, sequence: FrameSequence, index: int) -> Prog
             for array in sums) or any(n.shape != () or n.dtype.kind not in "biu" for n in counts)):
         return None
     passes, samples, spp, antialias = map(int, counts)
-    progress = Progress(*sums, passes, samples)
+    progress = SampleSums(*sums, passes, samples)
     if (antialias != job.antialias or not 2 <= spp <= max(_MOST_SPP, job.reference_spp or 0)
             or not _is_after_a_pass(progress, _sizes(job, spp))):
         return None
@@ -225,7 +225,7 @@ def _saved_progress(job: RenderJob, sequence: FrameSequence, index: int) -> Prog
     return progress if enough or _begins(job, _sizes(job, spp)[:passes]) else None
 
 
-def _smaller_reference(job: RenderJob, sequence: FrameSequence, index: int) -> Progress | None:
+def _smaller_reference(job: RenderJob, sequence: FrameSequence, index: int) -> SampleSums | None:
     """What a reference of fewer samples amounts to, if its passes are the first of ours."""
     try:
         smaller = sequence.read_reference(index) if sequence.has_reference(index) else None
@@ -234,7 +234,7 @@ def _smaller_reference(job: RenderJob, sequence: FrameSequence, index: int) -> P
     if smaller is None or smaller.spp is None or not 2 <= smaller.spp < (job.reference_spp or 0):
         return None
     passes = _sizes(job, smaller.spp)
-    return Progress.of(smaller, len(passes)) if _begins(job, passes) else None
+    return SampleSums.of(smaller, len(passes)) if _begins(job, passes) else None
 
 
 def _sizes(job: RenderJob, spp: int | None) -> list[int]:
@@ -246,7 +246,7 @@ def _begins(job: RenderJob, sizes: list[int]) -> bool:
     return _sizes(job, job.reference_spp)[:len(sizes)] == sizes
 
 
-def _is_after_a_pass(progress: Progress, sizes: list[int]) -> bool:
+def _is_after_a_pass(progress: SampleSums, sizes: list[int]) -> bool:
     """Whether it is the state between two passes, and not one torn by an interrupt."""
     return (0 <= progress.passes <= len(sizes)
             and progress.samples == sum(sizes[:progress.passes]))

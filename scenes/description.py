@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from . import validity
-from .errors import SceneError
 from .transforms import Matrix, identity
+from .validity import SceneError
 
 Color = tuple[float, float, float]
 Motion = Callable[[float], Matrix]

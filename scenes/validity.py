@@ -18,8 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from .errors import SceneError
-
 Bounds = tuple[float, float]
 
 ANY: Bounds = (-math.inf, math.inf)
@@ -150,8 +148,8 @@ def image(value: Any, what: str, bounds: Bounds = POSITIVE) -> np.ndarray:
     found = np.asarray(value)
     if np.issubdtype(found.dtype, np.integer) or found.dtype == bool:
         raise SceneError(f"{what} is an image of whole numbers ({found.dtype}): make 8-bit colours "
-                         "linear with onespp.scenes.materials.srgb8(...), and divide other data by its "
-                         "largest value")
+                         "linear with onespp.scenes.materials.srgb8(...), and divide other data by "
+                         "its largest value")
     found = _numbers(found, what)
     if found.ndim not in (2, 3) or (found.ndim == 3 and found.shape[2] not in (1, 3)):
         raise SceneError(f"{what} is an image of shape {found.shape}: use (h, w) or (h, w, 3)")
@@ -304,7 +302,12 @@ def _within(found: np.ndarray, what: str, bounds: Bounds) -> np.ndarray:
     least, most = float(found.min()), float(found.max())
     if least < low - _ROUNDING or most > high + _ROUNDING:
         odd = least if least < low - _ROUNDING else most
-        hint = " (8-bit colours become linear with onespp.scenes.materials.srgb8)" if most > 1 else ""
+        helper = " (8-bit colours become linear with onespp.scenes.materials.srgb8)"
+        hint = helper if most > 1 else ""
         use = f"{low:g} to {high:g}{hint}" if high < math.inf else f"{low:g} or more"
         raise SceneError(f"{what} {'is' if found.ndim == 0 else 'holds'} {odd:.6g}: use {use}")
     return np.clip(found, low, high)
+
+
+class SceneError(ValueError):
+    """A scene that cannot be built. The message is one sentence meant for its author."""

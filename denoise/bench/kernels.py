@@ -6,7 +6,7 @@ so that what else the machine does meets all alike, and each number is a median.
 Open Image Denoise's fast quality, as a method too, with albedo and normal.
 
 The shares of bandwidth and of arithmetic set the least that a kernel can do, counted by hand from
-the code below, against what `limits.py` has measured; the greater of the two says what bounds it.
+the code below, against what `machine_limits.py` measured; the greater says what bounds it.
 `speed_up` is the kernel's time with one thread over `ms`. `peak_mb` is what a state and a call need
 at their highest, without the frame and the image; `bytes_a_pixel` the same over the pixels.
 """

@@ -6,11 +6,9 @@ from pathlib import Path
 
 import click
 
-from onespp.denoise.metrics.tonemap import TONE_MAP
-from onespp.denoise.studies.ablation import ablate, markdown, variants
 from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import progress
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 
 
 @click.command()
@@ -19,15 +17,19 @@ from onespp.render.files.sequence import Sequence
 @click.option("--method", default="svgf", show_default=True, metavar="NAME")
 @device_option
 @threads_option
-def ablation(folders: tuple[Path, ...], method: str, device: str, threads: int | None) -> None:
+def ablate(folders: tuple[Path, ...], method: str, device: str, threads: int | None) -> None:
     """Print what each part of a method is worth on the sequences in DIR, as Markdown."""
     use(device, threads)
+    from onespp.denoise.metrics.tonemap import TONE_MAP
+    from onespp.denoise.studies.ablation import ablate as ablate_sequence
+    from onespp.denoise.studies.ablation import markdown, variants
+
     methods, results, notes = variants(method), {}, []
     with progress() as begin:
         for folder in folders:
-            sequence = Sequence.open(folder)
+            sequence = FrameSequence.open(folder)
             steps = begin(f"ablation of {method} on {folder.name}", len(sequence.frames))
-            results[folder.name] = ablate(sequence, methods, steps.advance)
+            results[folder.name] = ablate_sequence(sequence, methods, steps.advance)
             m = sequence.manifest
             made = "imported" if m.direct is None else (
                 f"seed {m.seed}, --direct {m.direct} --sampler {m.sampler}")

@@ -5,13 +5,14 @@ from __future__ import annotations
 import click
 
 from onespp.render.cli.arguments import parse_size
+from onespp.render.cli.bench import bench_render
 from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import progress
 
 from .options import json_option, show_or_print
 
 
-@click.command()
+@click.group(invoke_without_command=True)
 @click.option("--size", default="512x512", show_default=True, metavar="WxH", help="Pixels.")
 @click.option("--repeats", type=click.IntRange(1, 1000), default=15, show_default=True, metavar="N",
               help="Runs of each kernel, of which the median counts.")
@@ -20,9 +21,15 @@ from .options import json_option, show_or_print
 @json_option
 @device_option
 @threads_option
-def bench(size: str, repeats: int, scaling: bool, json_to: str | None, device: str,
-          threads: int | None) -> None:
-    """Measure the denoising kernels on this machine, against Open Image Denoise and its limits."""
+@click.pass_context
+def bench(context: click.Context, size: str, repeats: int, scaling: bool, json_to: str | None,
+          device: str, threads: int | None) -> None:
+    """Measure the denoising kernels on this machine, against Open Image Denoise and its limits.
+
+    `bench render` times the renderer.
+    """
+    if context.invoked_subcommand is not None:
+        return
     height, width = parse_size(size)
     use(device, threads)
     from onespp.denoise.bench.kernels import SIZES
@@ -40,3 +47,6 @@ def bench(size: str, repeats: int, scaling: bool, json_to: str | None, device: s
         steps = begin(f"bench {width}x{height}", repeats + 2)
         result = measure(height, width, repeats, lambda done, total: steps.advance(done))
     show_or_print(result.json_text(), json_to, lambda: print_bench(result))
+
+
+bench.add_command(bench_render)

@@ -16,7 +16,7 @@ from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import command_line, note, progress
 from onespp.render.errors import InputError
 from onespp.render.files.lock import writing
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.games202.layout import gaps
 
 DEFAULT_METHODS = ("onespp",)
@@ -66,7 +66,7 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
     from onespp.denoise.catalog import OUTLIERS, build
     from onespp.denoise.run.sequence import denoise_sequence
 
-    sequence = Sequence.open(folder)
+    sequence = FrameSequence.open(folder)
     chosen = _names(methods)
     if name is not None and len(chosen) > 1:
         raise InputError(f"--name {name} is one name for {len(chosen)} methods: give one --method")
@@ -99,7 +99,7 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
                f"into {sequence.folder / 'denoised'}")
 
 
-def _what_to_know(sequence: Sequence, default: bool) -> Iterator[str]:
+def _what_to_know(sequence: FrameSequence, default: bool) -> Iterator[str]:
     """What a user may not know of these frames, a sentence each; `default`: of the method, too."""
     if default and not set(SPLIT) <= set(sequence.manifest.channels):
         from onespp.denoise.catalog import PEERS
@@ -113,7 +113,7 @@ def _what_to_know(sequence: Sequence, default: bool) -> Iterator[str]:
                f"frame after {a}")
 
 
-def _gaps(sequence: Sequence) -> list[tuple[int, int]]:
+def _gaps(sequence: FrameSequence) -> list[tuple[int, int]]:
     """Neighbours between which frames are missing; a stride that was asked for misses none."""
     there = [i for i in sequence.frames if sequence.has_frame(i)]
     known = gaps(there) if sequence.manifest.source == "games202" else []
@@ -124,7 +124,7 @@ def _gaps(sequence: Sequence) -> list[tuple[int, int]]:
 def _denoise_externally(folder: Path, command: str, name: str) -> None:
     from onespp.denoise.run.external import denoise_externally
 
-    sequence = Sequence.open(folder)
+    sequence = FrameSequence.open(folder)
     with writing(folder, f"denoise-{name}"):
         run = denoise_externally(sequence, command, name, command_line())
     click.echo(f"denoised {len(run.ms)} frames by {name} into {sequence.folder / 'denoised'} "

@@ -6,8 +6,6 @@ from pathlib import Path
 
 import click
 
-from onespp.denoise.score.scorecard import read_scores
-from onespp.denoise.studies.lead import _psnr, markdown
 from onespp.render.errors import InputError
 
 
@@ -18,6 +16,9 @@ from onespp.render.errors import InputError
 @click.option("--peer", default="oidn-high", show_default=True, metavar="NAME")
 def lead(folders: tuple[Path, ...], method: str, peer: str) -> None:
     """Print how far a method is ahead of a peer, from the scores of pairs of folders."""
+    from onespp.denoise.score.scorecard import read_scores
+    from onespp.denoise.studies.lead import markdown, psnr_of
+
     if len(folders) % 2:
         raise InputError("folders come in pairs, of plain input and of ours: give one more")
     read = [read_scores(folder / "scores.json") for folder in folders]
@@ -28,7 +29,7 @@ def lead(folders: tuple[Path, ...], method: str, peer: str) -> None:
         click.echo(f"\n{name}: {len(ours.frames)} frames of {ours.size[0]}x{ours.size[1]}, "
                    f"reference {ours.reference_spp or 'of unknown'} spp, floor "
                    + (f"{floor:.1f} dB" if floor is not None else "not known")
-                   + "".join(f"; {key} {_psnr(s.methods[key]):.2f} dB{where}"
+                   + "".join(f"; {key} {psnr_of(s.methods[key]):.2f} dB{where}"
                              for s, key, where in ((plain, "input", " (plain)"),
                                                    (plain, peer, " (plain)"), (ours, "input", ""),
                                                    (ours, peer, ""), (ours, method, ""))), nl=False)

@@ -8,7 +8,7 @@ import click
 
 from onespp.render.cli.terminal import command_line, named_progress
 from onespp.render.files.lock import writing
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 
 from .score import score_in
 
@@ -22,7 +22,7 @@ def report(folder: Path, channels: str | None) -> None:
     from onespp.denoise.report.html import write_report
     from onespp.denoise.score.scorecard import read_scores
 
-    sequence = Sequence.open(folder)
+    sequence = FrameSequence.open(folder)
     if not (folder / "scores.json").exists():
         score_in(folder)
     names = channels and [name.strip() for name in channels.split(",") if name.strip()]

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import click
 
+from onespp.denoise.score.scorecard import INPUT
 from onespp.render.cli.terminal import command_line, named_progress
 from onespp.render.files.lock import writing
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 
 from .options import json_option, show_or_print
 
@@ -34,14 +35,18 @@ def score(folder: Path, methods: tuple[str, ...], json_to: str | None, pictures:
 def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = None,
              pictures: bool = True, by_cause: bool = False, seeds: tuple[Path, ...] = ()) -> None:
     """Do what the options of `score` ask."""
+    from onespp.denoise.report.contact_sheets import draw_pictures
     from onespp.denoise.report.terminal import print_classes, print_scores, print_splits
     from onespp.denoise.score.sequence import score as score_sequence
 
-    sequence = Sequence.open(folder)
-    others = [Sequence.open(other) for other in seeds]
+    sequence = FrameSequence.open(folder)
+    others = [FrameSequence.open(other) for other in seeds]
     with writing(folder, "score"), named_progress() as report:
-        scores = score_sequence(sequence, list(methods) or None, pictures, report, others,
-                                command_line())
+        scores = score_sequence(sequence, list(methods) or None, report, others, command_line())
+        if pictures:  # after the scores, which are on disk whatever happens here
+            trouble = draw_pictures(sequence, scores, [m for m in methods if m != INPUT] or None,
+                                    report)
+            scores = scores.model_copy(update={"notes": [*scores.notes, *trouble]})
 
     def show() -> None:
         print_scores(scores)

@@ -9,7 +9,7 @@ import click
 from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import command_line, progress
 from onespp.render.files.lock import writing
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 
 from .denoise import _names
 
@@ -31,7 +31,7 @@ def time_(folder: Path, methods: tuple[str, ...], frames: int, rounds: int, devi
     from onespp.denoise.catalog import build
     from onespp.denoise.run.interleaved_timing import time_methods
 
-    sequence = Sequence.open(folder)
+    sequence = FrameSequence.open(folder)
     chosen = {name: build(name) for name in _names(methods)}
     with writing(folder, "time"), progress() as begin:
         steps = begin("time", (rounds + 1) * min(frames, len(sequence.frames)))

@@ -11,7 +11,7 @@ from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import note, progress
 from onespp.render.errors import InputError
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 
 
 @click.command()
@@ -43,7 +43,7 @@ def tune(folders: tuple[Path, ...], method: str, names: tuple[str, ...],
     if unknown:
         raise InputError(f"method '{method}' has no parameter '{unknown[0]}': "
                          f"it has {', '.join(start)}")
-    cases = [read_case(Sequence.open(folder), build(method)) for folder in folders]
+    cases = [read_case(FrameSequence.open(folder), build(method)) for folder in folders]
     with progress() as begin:
         searched = list(names) or list(start)
         least = 2 * len(searched) * len(FACTORS)  # trials; a round that gains adds more

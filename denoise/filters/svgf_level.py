@@ -24,10 +24,12 @@ import drjit as dr
 
 from onespp.denoise.inputs.surface import Surface
 from onespp.denoise.jit.arrays import Float, Vector3
-from onespp.denoise.jit.fastmath import exp2
+from onespp.denoise.jit.color import LuminanceColor
+from onespp.denoise.jit.fastmath import LOG2E, exp2
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.taps import Taps, window
-from onespp.denoise.methods.atrous import LOG2E, SPLINE, LuminanceColor, LuminanceWeight, NoisyColor
+
+from .atrous import SPLINE, LuminanceWeight, NoisyColor
 
 EPSILON_DEPTH = 1e-3
 _BACKGROUND = 1e20   # depth where there is no surface: far from any, so that its weight is 0
@@ -60,11 +62,11 @@ class Geometry(NamedTuple):
     tolerance: DepthTolerance
 
 
-class LevelWeights(NamedTuple):
+class SvgfLevelWeights(NamedTuple):
     """How a level weighs differences: of luminance; of normals, by log2(e) normal_power / 2."""
 
     luminance: LuminanceWeight
-    half_power: Float
+    normal_exponent: Float
 
 
 def read_geometry(stencil: Stencil, surface: Surface, sigma_depth: float) -> Geometry:
@@ -83,22 +85,23 @@ def guides_of(nx: Float, ny: Float, nz: Float, depth: Float) -> Guides:
     return Guides(Vector3(nx, ny, nz), depth)
 
 
-def geometry_exponent(center: Geometry, tap: Guides, gradient: Float, half_power: Float) -> Float:
+def geometry_exponent(center: Geometry, tap: Guides, gradient: Float,
+                      normal_exponent: Float) -> Float:
     """log2 of the geometry weight; gradient: |grad z . (p - q)|, scaled as a `DepthTolerance`."""
     n, depth = center.guides
     t = dr.fma(-n.x, tap.normal.x, dr.fma(-n.y, tap.normal.y, dr.fma(-n.z, tap.normal.z, 1)))
-    e = -t * dr.fma(t, half_power, 2 * half_power)
+    e = -t * dr.fma(t, normal_exponent, 2 * normal_exponent)
     return dr.fma(-dr.abs(tap.depth - depth), 1 / (gradient + center.tolerance.constant), e)
 
 
 def filter_level(signal: Taps[NoisyColor], guides: Taps[Guides], center: NoisyColor,
                  geometry: Geometry, luminance_scale: Float, spacing: Float,
-                 half_power: Float) -> NoisyColor:
+                 normal_exponent: Float) -> NoisyColor:
     """One level.
 
     Args:
         center, geometry: of the pixel itself. luminance_scale: of `atrous.py`.
-        spacing: pixels between taps. half_power: of `LevelWeights`.
+        spacing: pixels between taps. normal_exponent: of `SvgfLevelWeights`.
     """
     h0 = SPLINE[0]**2
     color, v = center
@@ -107,7 +110,7 @@ def filter_level(signal: Taps[NoisyColor], guides: Taps[Guides], center: NoisyCo
     for i, (dy, dx) in enumerate(window(2)):
         tap, tap_variance = signal.at(i)
         gradient = dr.abs(dr.fma(dx_, float(dx), dy_ * float(dy)))
-        e = geometry_exponent(geometry, guides.at(i), gradient, half_power)
+        e = geometry_exponent(geometry, guides.at(i), gradient, normal_exponent)
         e += math.log2(SPLINE[abs(dy)] * SPLINE[abs(dx)])
         w = exp2(dr.fma(-dr.abs(tap.luminance - color.luminance), luminance_scale, e))
         sums, total = [dr.fma(w, c, s) for c, s in zip(tap, sums)], total + w

@@ -10,8 +10,8 @@ import drjit as dr
 
 from onespp.denoise.inputs.surface import TangentPlane
 from onespp.denoise.jit.arrays import Float
+from onespp.denoise.jit.fastmath import LOG2E
 from onespp.denoise.jit.taps import Offset, Taps
-from onespp.denoise.methods.atrous import LOG2E
 
 BINOMIAL = {0: 1 / 2, 1: 1 / 4}
 OTHER_OBJECT_WEIGHT = 0.4      # of a pixel of another object, beside its distance

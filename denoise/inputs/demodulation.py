@@ -27,12 +27,12 @@ SMALLEST_ALBEDO = 1e-2
 class Texture:
     """What is taken out, None where a frame does not have it.
 
-    black: mask of surfaces darker than the floor, None where there is no albedo.
+    zero_albedo: mask of surfaces that reflect (almost) nothing, as lamps; None without albedo.
     """
 
     albedo: Color | None = None
     emission: Color | None = None
-    black: Bool | None = None
+    zero_albedo: Bool | None = None
 
     def demodulate(self, color: Color) -> Color:
         """The light that makes a colour on this texture."""
@@ -57,11 +57,11 @@ def read_texture(frame: Frame, stencil: Stencil, demodulate: bool) -> Texture:
     albedo = stencil.load(np.asarray(frame["albedo"], np.float32))
     albedo = [dr.select(dr.abs(a) < 1e6, a, 1) for a in albedo]
     dark = [a < SMALLEST_ALBEDO for a in albedo]
-    black = dark[0] & dark[1] & dark[2]
-    floor = dr.select(black, stencil.Float(1), SMALLEST_ALBEDO)
+    zero_albedo = dark[0] & dark[1] & dark[2]
+    floor = dr.select(zero_albedo, stencil.Float(1), SMALLEST_ALBEDO)
     albedo = Color(*[dr.select(d, floor, a) for d, a in zip(dark, albedo)])
     if "emission" not in frame:
-        return Texture(albedo, None, black)
+        return Texture(albedo, None, zero_albedo)
     emission = stencil.load(np.asarray(frame["emission"], np.float32))
     emission = Color(*[dr.select(dr.abs(e) < 1e18, e, 0) for e in emission])
-    return Texture(albedo, emission, black)
+    return Texture(albedo, emission, zero_albedo)

@@ -87,7 +87,7 @@ _FARTHEST = 1e15  # of a point of a light that counts
 
 def light_sizes(frame: Frame) -> np.ndarray:
     """(objects + 1,) float32: twice the standard deviation of the points of each object that shadow
-    rays asked for and, last, of the environment's points. Infinite for less than `_FEWEST_POINTS`."""
+    rays asked for and, last, of the environment's. Infinite for less than `_FEWEST_POINTS`."""
     count = len(frame.world_from_object) + 1
     step = max(1, round((frame.height * frame.width / _LIGHT_SAMPLES) ** 0.5))
     some = slice(step // 2, None, step)

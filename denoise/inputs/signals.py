@@ -1,7 +1,7 @@
 """A frame's light as the signals that are filtered apart, and the frame's colour from them.
 
 Symbols: E emission, D direct and I indirect light, a albedo; U unshadowed light and V the share of
-it that arrives (`render/lights.py`); G the part of I that a glossy lobe chose.
+it that arrives (`render/tracer/lights.py`); G the part of I that a glossy lobe chose.
 
     colour = E + V U + a L + G        L = (I - G + D - V U) / a
 
@@ -24,10 +24,9 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.jit.arrays import Color, Float
-from onespp.denoise.jit.color import luminance, with_green
+from onespp.denoise.jit.color import LuminanceColor, luminance, with_green
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import arrays_of
-from onespp.denoise.methods.atrous import LuminanceColor
 from onespp.render.frame import Frame
 
 from .demodulation import Texture, read_texture
@@ -105,7 +104,7 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
         return stencil.load(repair(image, frame["id"]))
 
     if "emission" in frame and not texture.emission:
-        texture = Texture(texture.albedo, Color(*load("emission")), texture.black)
+        texture = Texture(texture.albedo, Color(*load("emission")), texture.zero_albedo)
     light = Color(*[d + i for d, i in zip(load("direct"), load("indirect"))])
     apart: dict[SignalKind, Signal] = {}
     unshadowed = None

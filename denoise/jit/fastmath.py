@@ -37,3 +37,6 @@ def exp2(x: Float) -> Float:
     bits: Any = dr.reinterpret_array(int_t, power) + exponent
     weight: Any = dr.reinterpret_array(float_t, bits)
     return weight - _LEAST_POWER
+
+
+LOG2E = 1.4426950408889634

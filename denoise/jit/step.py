@@ -1,5 +1,6 @@
 """Functions of arrays, recorded at their first call and replayed after that."""
 
+# pyright: standard
 from __future__ import annotations
 
 import gc

@@ -53,7 +53,7 @@ def build(form: Form, arrays: Iterable[Any], taps: Iterable[Any] = ()) -> Any:
     """The structure of this form with these arrays and taps."""
     if form[0] is list and all(type(token) is int for token in form[1:]):
         return list(arrays)  # of arrays alone, as most results are
-    return _build(iter(form), iter(arrays), iter(taps))
+    return _build(1, iter(form), iter(arrays), iter(taps))[0]
 
 
 def arrays_of(*structures: Any) -> list[Any]:
@@ -105,15 +105,21 @@ def _kind(type_: type) -> int:
                     "arrays, None, and NamedTuples, tuples and lists of them")
 
 
-def _build(form: Iterator[Any], arrays: Iterator[Any], taps: Iterator[Any]) -> Any:
-    token = next(form)
-    if token is None:
-        return None
-    if isinstance(token, int):
-        return next(arrays)
-    if token is list or token is tuple:
-        return token([_build(form, arrays, taps) for _ in range(next(form))])
-    if _kinds[token] == _TAPS:
-        next(form)  # their lanes
-        return next(taps)
-    return token(*[_build(form, arrays, taps) for _ in token._fields])
+def _build(count: int, form: Iterator[Any], arrays: Iterator[Any],
+           taps: Iterator[Any]) -> list[Any]:
+    """The next so many parts. As in `_flatten`, arrays cost no call."""
+    parts: list[Any] = []
+    for _ in range(count):
+        token = next(form)
+        if type(token) is int:
+            parts.append(next(arrays))
+        elif token is None:
+            parts.append(None)
+        elif token is list or token is tuple:
+            parts.append(token(_build(next(form), form, arrays, taps)))
+        elif _kinds[token] == _TAPS:
+            next(form)  # their lanes
+            parts.append(next(taps))
+        else:
+            parts.append(token(*_build(len(token._fields), form, arrays, taps)))
+    return parts

@@ -1,5 +1,6 @@
 """Planes seen from a pixel's neighbours."""
 
+# pyright: standard
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -1,5 +1,6 @@
 """Vectors and 3x3 matrices of arrays."""
 
+# pyright: standard
 from __future__ import annotations
 
 import drjit as dr

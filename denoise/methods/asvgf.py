@@ -1,12 +1,12 @@
 """Adaptive temporal filtering (A-SVGF): SVGF whose history gives way where shading has changed.
 
 Symbols: now, before the luminances of a sample of the last frame, shaded again in this one with the
-same random numbers (`render/gradient.py`); S the 3x3 strata of the image; F an a-trous filter
+same random numbers (`render/tracer/replay.py`); S the 3x3 strata of the image; F an a-trous filter
 over strata, {1/16, 1/4, 3/8, 1/4, 1/16}^2 at steps 1, 2, 4, ...
 
     g = F[sum |now - before|] / F[sum max(now, before)],  lambda = clamp(gradient_scale g, 0, 1)
 
-of direct and indirect light each, and `moments.py` says what lambda does to their histories.
+of direct and indirect light each; what lambda does to their histories: `svgf_accumulation.py`.
 
 Source: Schied, Peters and Dachsbacher 2018, "Gradient estimation for real-time adaptive temporal
 filtering", doi:10.1145/3233301. Defaults of alpha and history length are Quake II RTX's; those of
@@ -26,6 +26,7 @@ from typing import ClassVar, NamedTuple
 import drjit as dr
 import numpy as np
 
+from onespp.denoise.filters.atrous import LARGEST_LEVELS, SPLINE
 from onespp.denoise.history.records import RecordState
 from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.grid import Planes, Stencil
@@ -35,7 +36,6 @@ from onespp.denoise.jit.taps import Taps, window
 from onespp.render.channels import REPLAY
 from onespp.render.frame import Frame
 
-from .atrous import LARGEST_LEVELS, SPLINE
 from .base import OnLanes
 from .parameters import check_positive, check_range, check_whole
 from .svgf import Passes, Svgf

@@ -1,4 +1,7 @@
-"""What our methods share: a frame goes to lanes, is worked on there, and comes back."""
+"""What our methods share: a frame becomes Dr.Jit arrays, is denoised, and becomes an image again.
+
+A lane is an element of a Dr.Jit array: one pixel, or padding at the end of a row (`jit/grid.py`).
+"""
 
 from __future__ import annotations
 
@@ -58,5 +61,12 @@ class OnLanes(Generic[State]):
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,
                  state: State) -> tuple[Color, State]:
-        """The same from arrays of lanes to arrays of lanes, in place of the frame's colour."""
+        """Denoise one frame on Dr.Jit arrays.
+
+        Args:
+            color: the frame's colour, or what an earlier stage made of it; linear radiance.
+            surface: the frame's guides, camera space. state: of the frame before.
+        Returns:
+            linear radiance, which rounding may leave below 0, and the state for the next frame.
+        """
         raise NotImplementedError

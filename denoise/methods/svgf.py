@@ -1,15 +1,15 @@
 """Spatiotemporal variance-guided filtering (SVGF) as published.
 
 Direct and indirect light without texture are accumulated with the history of the same surface
-(`history.py`), their variance is estimated over time (`moments.py`), and an a-trous filter guided
-by it removes what noise is left (`wavelet.py`). The first level's output is the next frame's
-history.
+(`history/records.py`), their variance is estimated over time (`svgf_accumulation.py`), and an
+a-trous filter guided by it removes what noise is left (`filters/svgf_level.py`). The first level's
+output is the next frame's history.
 
 Source: Schied et al. 2017, "Spatiotemporal variance-guided filtering: real-time reconstruction for
 path-traced global illumination", doi:10.1145/3105762.3105770. Defaults are its constants;
 `max_history_length` is 32 in NVIDIA's pass.
 
-Departures, beside those that the three modules list:
+Departures, beside those that these modules list:
 - A frame without direct and indirect light (an import) is one signal, its colour.
 - No tone mapping and no temporal anti-aliasing after the filter: scores compare radiance.
 """
@@ -22,11 +22,18 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from onespp.denoise.filters.atrous import (
+    LARGEST_LEVELS,
+    NoisyColor,
+    luminance_scale,
+    luminance_weight,
+    noisy_color,
+)
 from onespp.denoise.filters.svgf_level import (
     OUTSIDE,
     Geometry,
     Guides,
-    LevelWeights,
+    SvgfLevelWeights,
     filter_level,
     guides_of,
     read_geometry,
@@ -42,23 +49,14 @@ from onespp.denoise.inputs.demodulation import Texture, read_texture
 from onespp.denoise.inputs.repair import repair
 from onespp.denoise.inputs.surface import Surface, SurfaceSample
 from onespp.denoise.jit.arrays import Color, Float
-from onespp.denoise.jit.color import with_green
+from onespp.denoise.jit.color import LuminanceColor, with_green, with_luminance
+from onespp.denoise.jit.fastmath import LOG2E
 from onespp.denoise.jit.grid import Planes, Stencil, single
 from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import evaluate
 from onespp.denoise.jit.taps import Taps, window
 from onespp.render.frame import Frame
 
-from .atrous import (
-    LARGEST_LEVELS,
-    LOG2E,
-    LuminanceColor,
-    NoisyColor,
-    luminance_scale,
-    luminance_weight,
-    noisy_color,
-    with_luminance,
-)
 from .base import OnLanes
 from .parameters import HISTORY_RENAMED, check_positive, check_range, check_whole
 from .svgf_accumulation import (
@@ -156,10 +154,10 @@ class Svgf(OnLanes["RecordState[Passes]"]):
         passes.guides.store(geometry.guides)
         accumulated, window_table = passes.accumulate(
             light.signals, sample, motion, state.records, geometry.guides, changes,
-            self._least_weights(stencil, len(light.signals)), self._tests(stencil))
+            self._accumulation_weights(stencil, len(light.signals)), self._tests(stencil))
         variances = passes.estimate_variances(accumulated, geometry, window_table,
                                               self._min_temporal_length(stencil),
-                                              weights.half_power)
+                                              weights.normal_exponent)
         filtered = passes.filter_levels(accumulated, variances, geometry, weights)
         history = self._history(accumulated, filtered)
         records = passes.pack(sample, history) if self.accumulate else state.records
@@ -168,7 +166,8 @@ class Svgf(OnLanes["RecordState[Passes]"]):
 
     def shading_changes(self, frame: Frame, count: int,
                         state: RecordState[Passes]) -> list[Float]:
-        """lambda of each of `count` signals (see `moments.py`), or none, as here."""
+        """Temporal gradient of each of `count` signals, 0 unchanged to 1 history discarded (see
+        `svgf_accumulation.py`); none here, A-SVGF has them."""
         return []
 
     def alphas(self, count: int) -> list[float]:
@@ -194,7 +193,7 @@ class Svgf(OnLanes["RecordState[Passes]"]):
             return Passes.make(state.stencil, count, self.levels, self.fallback)
         return state.passes
 
-    def _least_weights(self, stencil: Stencil, count: int) -> AccumulationWeights:
+    def _accumulation_weights(self, stencil: Stencil, count: int) -> AccumulationWeights:
         return AccumulationWeights([stencil.opaque(a) for a in self.alphas(count)],
                                    stencil.opaque(self.alpha_moments),
                                    stencil.opaque(self.max_history_length))
@@ -203,8 +202,8 @@ class Svgf(OnLanes["RecordState[Passes]"]):
         return ReprojectionTests(stencil.opaque(self.min_cosine),
                                  stencil.opaque(self.plane_tolerance))
 
-    def _level_weights(self, stencil: Stencil) -> LevelWeights:
-        return LevelWeights(luminance_weight(stencil, self.sigma_luminance),
+    def _level_weights(self, stencil: Stencil) -> SvgfLevelWeights:
+        return SvgfLevelWeights(luminance_weight(stencil, self.sigma_luminance),
                             stencil.opaque(LOG2E * self.normal_power / 2))
 
     def _min_temporal_length(self, stencil: Stencil) -> Float:
@@ -278,7 +277,7 @@ class Passes:
                       Step(lambda *a: pack_records(stencil, *a)))
 
     def filter_levels(self, accumulated: Accumulated, variances: list[Float], geometry: Geometry,
-                      weights: LevelWeights) -> FilteredColors:
+                      weights: SvgfLevelWeights) -> FilteredColors:
         """The a-trous filter of each signal."""
         first, last = [], []
         for levels, signal, variance in zip(self.filters, accumulated.signals, variances,
@@ -324,13 +323,13 @@ class Levels:
                       [Level.make(i, signal, guides) for i in range(levels)])
 
     def filter(self, noisy: NoisyColor, geometry: Geometry,
-               weights: LevelWeights) -> tuple[NoisyColor, NoisyColor]:
+               weights: SvgfLevelWeights) -> tuple[NoisyColor, NoisyColor]:
         """What the first level and the last one give."""
         first = noisy
         for i, level in enumerate(self.levels):
             self.signal.store(noisy)
             scale = level.scale(self.blur_taps, noisy.variance, weights.luminance)
             noisy = level.filter(level.signal, level.guides, noisy, geometry, scale,
-                                 level.spacing, weights.half_power)
+                                 level.spacing, weights.normal_exponent)
             first = noisy if i == 0 else first
         return first, noisy

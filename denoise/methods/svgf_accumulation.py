@@ -6,7 +6,7 @@ A signal is (r, l, b), l its luminance, as in `atrous.py`.
     h = min(h' + 1, max_history_length), 1 without history
     C = C' + max(alpha, 1/h) (c - C'),  the same for m1, m2 with alpha_moments
     v = max(0, m2 - m1^2);  while h < 4, m1 and m2 are means over a 7x7 window with the geometry
-        weights of `wavelet.py`, and v is multiplied by 4 / h.
+        weights of `filters/svgf_level.py`, and v is multiplied by 4 / h.
 
 With a change of shading lambda in [0, 1] (A-SVGF), a = lambda + (1 - lambda) max(alpha, 1/h) is the
 weight of the current frame, and h = min(h' (1 - lambda)^10 + 1, max_history_length).
@@ -28,12 +28,11 @@ from onespp.denoise.history.records import look_up
 from onespp.denoise.history.reprojection import Motion, ReprojectionTests, locate
 from onespp.denoise.inputs.surface import SurfaceSample
 from onespp.denoise.jit.arrays import Float
+from onespp.denoise.jit.color import LuminanceColor
 from onespp.denoise.jit.fastmath import exp2
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.masked import tabulate, weighted_sums, window_taps
 from onespp.denoise.jit.structure import arrays_of
-
-from .atrous import LuminanceColor
 
 FORGETTING = 10      # power of 1 - lambda that a length is multiplied by
 SHORT = 4.0          # frames of history from which on its moments give the variance
@@ -123,13 +122,13 @@ def tabulate_moments(stencil: Stencil, accumulated: Accumulated, guides: Guides)
 
 def estimate_variances(stencil: Stencil, accumulated: Accumulated, geometry: Geometry,
                        window_table: Float, min_temporal_length: Float,
-                       half_power: Float) -> list[Float]:
+                       normal_exponent: Float) -> list[Float]:
     """v of each signal.
 
     Args:
         window_table: of `tabulate_moments`.
         min_temporal_length: from which on history gives the variance, not the window.
-        half_power: of `wavelet.LevelWeights`.
+        normal_exponent: of `svgf_level.SvgfLevelWeights`.
     """
     lengths, signals = accumulated
     is_short = [h < min_temporal_length for h in lengths]
@@ -141,7 +140,7 @@ def estimate_variances(stencil: Stencil, accumulated: Accumulated, geometry: Geo
         inside, dy, dx, words = around(i)
         gradient = dr.abs(dr.fma(tolerance.dx, dx, tolerance.dy * dy))
         w = exp2(geometry_exponent(geometry, guides_of(*words[count:count + 4]), gradient,
-                                   half_power))
+                                   normal_exponent))
         return dr.select(inside, w, 0), words[:count]
 
     total, sums = weighted_sums(stencil, active, (2 * RADIUS + 1)**2, count, tap)

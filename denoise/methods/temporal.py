@@ -3,7 +3,7 @@
     out = alpha C + (1 - alpha) clamp(H, mu - k sigma, mu + k sigma)
 
 C the current frame's (filtered) colour; H the history where the surface was (`reprojection.py`);
-mu and sigma mean and standard deviation of C in a window (`window_moments.py`), per channel;
+mu and sigma mean and standard deviation of C in a window (`filters/color_box.py`), per channel;
 alpha = 1 where there is no history.
 
 Sources: GAMES202, assignment 5; Yang et al. 2020, "A survey of temporal antialiasing techniques",

@@ -15,7 +15,7 @@ class Metric:
         label: heading in tables.
         function: (a, b) -> float, finite for finite images; None where it does not apply.
         space: what `function` takes, "linear" radiance, "srgb" display values, or a "step" of two
-            frames (`stability.py`).
+            frames (`flicker.py`).
         unit: goes with the label, as "dB"; "" where there is none.
         higher_is_better: the direction.
         format: how tables print it.

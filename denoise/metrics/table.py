@@ -2,7 +2,7 @@
 
 Symbols: a the image to judge, b the reference, both (h, w, 3); S the tone map; means run over
 pixels and colours alike, in float64. A row says in which space its function takes a and b:
-"linear" radiance, or "srgb", display values in [0, 1] (`denoise/tonemap.py`).
+"linear" radiance, or "srgb", display values in [0, 1] (`tonemap.py`).
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from .flicker import boiling, difference_psnr, flicker
 from .image import Pair, pair
 from .metric import Metric
 from .ssim import ssim
-from .table import METRICS
 
 _ROWS = (
     Metric("psnr_srgb", "PSNR", psnr, "srgb", "dB", True, ".2f",

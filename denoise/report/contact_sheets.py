@@ -7,7 +7,7 @@ of each below it), `sequence.mp4` (input, a method or more, reference, side by s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from PIL import Image
@@ -17,7 +17,8 @@ from onespp.denoise.metrics.table import HEADLINE, spread
 from onespp.denoise.metrics.tonemap import bytes_from_linear
 from onespp.denoise.score.scorecard import INPUT, Scores
 from onespp.render.files.atomic import replacing
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
+from onespp.render.progress import Progress
 
 from .movie import MovieError, write_movie
 from .panels import GAP, error_legend, error_picture, panel, resize, scaled_size, tile
@@ -26,10 +27,9 @@ from .speed_error_plot import plot_speed_against_error
 SHEETS = 3
 WANTED, LARGE_ENOUGH, WIDEST = 480, 640, 3960  # widths in pixels: see `contact_sheet`
 
-Progress = Callable[[int, int, str], None]
 
 
-def draw_pictures(sequence: Sequence, scores: Scores, movie_methods: list[str] | None = None,
+def draw_pictures(sequence: FrameSequence, scores: Scores, movie_methods: list[str] | None = None,
                   progress: Progress | None = None) -> list[str]:
     """Write all pictures of a sequence, one frame in memory at a time.
 
@@ -73,7 +73,7 @@ def best_method(scores: Scores) -> list[str]:
     return sorted(others, key=lambda n: -(scores.methods[n][HEADLINE.name] or 0))[:1]
 
 
-def contact_sheet(sequence: Sequence, scores: Scores, frame: int) -> Image.Image:
+def contact_sheet(sequence: FrameSequence, scores: Scores, frame: int) -> Image.Image:
     """Input, every method that has this frame from fast to slow, reference; below each its error.
 
     The reference has none: the colours' scale is there. Small pictures grow to about `WANTED`
@@ -105,7 +105,8 @@ def _columns(count: int, size: tuple[int, int]) -> int:
     return -(-count // rows)
 
 
-def movie_pictures(sequence: Sequence, scores: Scores, methods: list[str]) -> Iterator[np.ndarray]:
+def movie_pictures(sequence: FrameSequence, scores: Scores,
+                   methods: list[str]) -> Iterator[np.ndarray]:
     """One picture a frame: input, methods, reference, with each frame's PSNR."""
     columns = 1 + len(methods) + scores.has_reference
     size = scaled_size(sequence.size, columns, 1920 // columns, WIDEST)
@@ -134,7 +135,7 @@ def display_errors(images: Iterable[np.ndarray], reference: np.ndarray) -> Itera
         yield np.abs(a - b).mean(axis=-1)
 
 
-def _images(sequence: Sequence, scores: Scores, frame: int,
+def _images(sequence: FrameSequence, scores: Scores, frame: int,
             methods: list[str]) -> Iterator[tuple[str, str, np.ndarray]]:
     """(name, what to say of it, linear image) of what there is of a frame, reference last."""
     def value(method: str) -> str:

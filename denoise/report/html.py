@@ -1,7 +1,7 @@
 """The report of a scored sequence: a folder that opens in a browser, from disk, without a server.
 
     report/index.html           figures, plots, table, viewer: everything but the pixels
-    report/data/KIND/.../0000.js    one packed image each (packed.py), loaded when looked at
+    report/data/KIND/.../0000.js    one packed image each (page_images.py), loaded when looked at
     report/scores.json, scores.csv
 
 KIND is `frame/CHANNEL`, `reference` or `denoised/METHOD`. Equal input gives an equal
@@ -22,10 +22,11 @@ from onespp.denoise.score.scorecard import INPUT, Scores
 from onespp.render.channels import IDS, RADIANCE
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import all_or_none, write_text
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
+from onespp.render.progress import Progress
 
 from . import page_images as packed
-from .contact_sheets import Progress, display_errors
+from .contact_sheets import display_errors
 from .page_data import best_cells, highlights, page_data, table_data
 from .provenance import provenance
 from .terminal import caption
@@ -39,7 +40,7 @@ _SCRIPTS = ("format.js", "work.js", "pixels.js", "plots.js", "charts.js", "view.
             "readout.js", "viewer.js", "controls.js", "page.js")
 
 
-def write_report(sequence: Sequence, scores: Scores, channels: Iterable[str] | None = None,
+def write_report(sequence: FrameSequence, scores: Scores, channels: Iterable[str] | None = None,
                  progress: Progress | None = None, command: str = "") -> Path:
     """Write `report/` into the sequence's folder; the path of its index.html.
 
@@ -83,7 +84,7 @@ def write_report(sequence: Sequence, scores: Scores, channels: Iterable[str] | N
     return folder / "index.html"
 
 
-def _channels(sequence: Sequence, wanted: Iterable[str] | None) -> list[str]:
+def _channels(sequence: FrameSequence, wanted: Iterable[str] | None) -> list[str]:
     there = [name for name in sequence.manifest.channels if name != "color"]
     if wanted is None:
         return there
@@ -95,7 +96,7 @@ def _channels(sequence: Sequence, wanted: Iterable[str] | None) -> list[str]:
     return [name for name in there if name in names]
 
 
-def _images(sequence: Sequence, scores: Scores, frame: int,
+def _images(sequence: FrameSequence, scores: Scores, frame: int,
             channels: list[str]) -> Iterator[tuple[str, np.ndarray, packed.Kind]]:
     """(where it belongs, image, how it is stored) of all images of a frame."""
     images = sequence.read_frame(frame, ("color", *channels)).images
@@ -131,7 +132,7 @@ def _measure(images: dict[str, np.ndarray], histograms: dict[str, np.ndarray],
                 ranges[name] = (min(low, float(values.min())), max(high, float(values.max())))
 
 
-def render_page(sequence: Sequence, scores: Scores, data: dict, command: str = "") -> str:
+def render_page(sequence: FrameSequence, scores: Scores, data: dict, command: str = "") -> str:
     """The text of index.html."""
     environment = jinja2.Environment(loader=jinja2.PackageLoader("onespp.denoise.report", "page"),
                                      autoescape=True, undefined=jinja2.StrictUndefined,

@@ -14,7 +14,7 @@ from onespp.denoise.metrics.table import HEADLINE, MEASURES
 from onespp.denoise.score.causes import CAUSES, HISTORIES
 from onespp.denoise.score.scorecard import INPUT, ClassScore, MethodScore, Scores
 from onespp.render.channels import CHANNELS
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 
 from .panels import ERROR_MAX
 from .speed_error_plot import pareto_front, times_are
@@ -23,7 +23,7 @@ from .terminal import cells
 _SHOWN_ELSEWHERE = {"method", "ms_per_frame", "machine", *MEASURES}
 
 
-def page_data(sequence: Sequence, scores: Scores, channels: list[str],
+def page_data(sequence: FrameSequence, scores: Scores, channels: list[str],
               ranges: dict[str, tuple[float, float]], histograms: dict[str, list[float]],
               edges: np.ndarray) -> dict[str, Any]:
     """What the page's scripts read.
@@ -65,7 +65,7 @@ def _metric(metric: Metric, scores: Scores) -> dict[str, Any]:
             "about": metric.about, "front": pareto_front(points)}
 
 
-def _method(sequence: Sequence, scores: Scores, name: str, metrics: list[Metric],
+def _method(sequence: FrameSequence, scores: Scores, name: str, metrics: list[Metric],
             histogram: list[float] | None) -> dict[str, Any]:
     method = scores.methods[name]
     rows = {row.frame: row for row in method.per_frame}
@@ -187,7 +187,7 @@ def highlights(scores: Scores) -> list[dict[str, str]]:
                       "about": f"{scores.reference_spp} spp; a perfect image would score this"})
     samples = "" if scores.spp is None else (
         f" at {scores.spp} sample{'s' if scores.spp > 1 else ''} a pixel")
-    tiles.append({"label": "Sequence", "value": f"{len(scores.frames)} frames",
+    tiles.append({"label": "FrameSequence", "value": f"{len(scores.frames)} frames",
                   "about": f"{width}x{height}{samples}"})
     return tiles
 

@@ -6,29 +6,20 @@ manifest.json, run.json, times.json and scores.json. None is worked out afterwar
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 from onespp.denoise.methods.parameters import present_parameters
+from onespp.denoise.score.commands import commands
 from onespp.denoise.score.scorecard import INPUT, Scores
 from onespp.render.files.manifest import Run
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.files.times import Times, read_times
 
 from .page_data import text_of
 from .terminal import caption
 
 
-def commands(sequence: Sequence, methods: Iterable[str]) -> list[str]:
-    """What made a sequence, the methods' results and the times, in that order; each line once."""
-    times = read_times(sequence.folder)
-    runs = [sequence.read_run(name) for name in methods if name != INPUT]
-    lines = [*sequence.manifest.commands, *(run.command for run in runs),
-             times.command if times else ""]
-    return [line for line in dict.fromkeys(lines) if line]
-
-
-def provenance(sequence: Sequence, scores: Scores, command: str = "") -> dict[str, Any]:
+def provenance(sequence: FrameSequence, scores: Scores, command: str = "") -> dict[str, Any]:
     """How the numbers came to be: commands, settings, versions, machines, each method's run.
 
     `command` is the line that makes the report.
@@ -55,7 +46,7 @@ def provenance(sequence: Sequence, scores: Scores, command: str = "") -> dict[st
     }
 
 
-def _unrecorded(sequence: Sequence, scores: Scores, runs: dict[str, Run]) -> str:
+def _unrecorded(sequence: FrameSequence, scores: Scores, runs: dict[str, Run]) -> str:
     """What has no command line: made by an older version, or by a program of one's own."""
     lacking = [] if sequence.manifest.commands else ["the sequence"]
     lacking += [name for name, run in runs.items() if not run.command]
@@ -63,7 +54,7 @@ def _unrecorded(sequence: Sequence, scores: Scores, runs: dict[str, Run]) -> str
     return ", ".join(lacking)
 
 
-def _machines(sequence: Sequence, runs: dict[str, Run],
+def _machines(sequence: FrameSequence, runs: dict[str, Run],
               times: Times | None) -> list[tuple[str, str]]:
     """What was done where, where that is known."""
     def with_threads(machine: str, device: str, threads: int | None) -> str:

@@ -1,7 +1,7 @@
 """Any program as a method: it reads frames in the assignment's layout and writes results.
 
 `'PROGRAM {input} {output} {frames}'`: {input} becomes a folder with beauty_0.exr, normal_0.exr, ...
-(`render/games202.py`), {output} an empty one, where the program leaves result_0.exr, ...; {frames}
+(`render/games202/`), {output} an empty one, where the program leaves result_0.exr, ...; {frames}
 is how many there are. The line is split as a shell would, and no shell runs it.
 """
 
@@ -15,10 +15,9 @@ import time
 from pathlib import Path
 
 from onespp.denoise.catalog import check_not_a_method
-from onespp.render.cli.terminal import readable
-from onespp.render.errors import InputError
+from onespp.render.errors import InputError, readable
 from onespp.render.files.manifest import Run, check_result_name
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.games202.convert import export_games202, import_result
 from onespp.render.host.machine import machine
 
@@ -26,7 +25,7 @@ _LAST_LINES, _MOST_LETTERS = 3, 300
 PLACES: tuple[str, ...] = ("{input}", "{output}", "{frames}")
 
 
-def denoise_externally(sequence: Sequence, command: str, name: str, typed: str = "") -> Run:
+def denoise_externally(sequence: FrameSequence, command: str, name: str, typed: str = "") -> Run:
     """Export the frames, run the program, import its results as those of the method `name`.
 
     Args:

@@ -17,7 +17,7 @@ from onespp.denoise.catalog import Method, channels_read, parameters
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
 from onespp.render.files.json_file import format_json
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.files.times import MethodTime, Times
 from onespp.render.host import backend
 from onespp.render.host.machine import machine
@@ -25,7 +25,7 @@ from onespp.render.host.machine import machine
 from .timed import timed
 
 
-def time_methods(sequence: Sequence, methods: Mapping[str, Method], frames: int = 4,
+def time_methods(sequence: FrameSequence, methods: Mapping[str, Method], frames: int = 4,
                  rounds: int = 5, on_step: Callable[[int], None] = lambda done: None,
                  command: str = "") -> Times:
     """Measure methods in turns, and write times.json into the sequence's folder.

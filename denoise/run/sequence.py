@@ -29,7 +29,7 @@ from onespp.denoise.catalog import (
 from onespp.denoise.methods.outliers import energy_kept
 from onespp.denoise.methods.parameters import present_parameters
 from onespp.render.files.manifest import Run, check_result_name
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.frame import Frame
 from onespp.render.host import backend
 from onespp.render.host.machine import machine
@@ -69,7 +69,7 @@ class _Files:
     With `overlap` set, a frame is read and a result written while the caller goes on.
     """
 
-    def __init__(self, sequence: Sequence, name: str, used: tuple[str, ...],
+    def __init__(self, sequence: FrameSequence, name: str, used: tuple[str, ...],
                  threads: Threads) -> None:
         self.overlap, self.seconds = False, 0.0
         self._sequence, self._name, self._used = sequence, name, used
@@ -108,7 +108,7 @@ class _Files:
         return self._threads.submit(timed_call)
 
 
-def denoise_sequence(sequence: Sequence, method: Method, name: str,
+def denoise_sequence(sequence: FrameSequence, method: Method, name: str,
                      on_frame: Callable[[int, float], None] = lambda done, ms: None,
                      on_pace: Callable[[Pace], None] = lambda pace: None,
                      command: str = "") -> Run:
@@ -169,7 +169,7 @@ def denoise_sequence(sequence: Sequence, method: Method, name: str,
     return run
 
 
-def _remove_stale(sequence: Sequence, name: str, run: Run) -> None:
+def _remove_stale(sequence: FrameSequence, name: str, run: Run) -> None:
     """Drop results that this run would otherwise be mixed with: others', and a killed run's."""
     if name in sequence.methods():
         old = sequence.read_run(name)

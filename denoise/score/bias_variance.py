@@ -21,12 +21,12 @@ from onespp.denoise.metrics.image import pair
 from onespp.denoise.metrics.noise_floor import reference_floor
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import first_difference
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 
 from .scorecard import INPUT, ErrorSplit
 
 
-def split_errors(sequences: list[Sequence], methods: list[str]) -> dict[str, ErrorSplit]:
+def split_errors(sequences: list[FrameSequence], methods: list[str]) -> dict[str, ErrorSplit]:
     """The split for each method that all sequences have results of.
 
     Args:
@@ -66,7 +66,7 @@ def _split(images: list[tuple[np.ndarray, np.ndarray]], noise: float) -> np.ndar
     return np.array([np.mean((a - b) ** 2), bias, variance])
 
 
-def _check(sequences: list[Sequence]) -> None:
+def _check(sequences: list[FrameSequence]) -> None:
     first = sequences[0].manifest
     for other in sequences[1:]:
         changed = other.manifest.model_copy(update={"seed": first.seed})
@@ -79,11 +79,11 @@ def _check(sequences: list[Sequence]) -> None:
                          "different seeds (`onespp render --seed`)")
 
 
-def _has(sequence: Sequence, method: str, i: int) -> bool:
+def _has(sequence: FrameSequence, method: str, i: int) -> bool:
     return sequence.has_frame(i) if method == INPUT else sequence.has_result(method, i)
 
 
-def _read(sequence: Sequence, method: str, i: int) -> np.ndarray:
+def _read(sequence: FrameSequence, method: str, i: int) -> np.ndarray:
     if method == INPUT:
         return sequence.read_frame(i, ("color",))["color"]
     return sequence.read_result(method, i)

@@ -7,13 +7,13 @@ from typing import Any
 
 from onespp.denoise.methods.parameters import present_parameters
 from onespp.render.files.manifest import Run
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.files.times import Times
 
 STARTING = 3  # frames in which kernels compile: a history's are first needed in the second
 
 
-def cost(sequence: Sequence, run: Run | None, times: Times | None) -> dict[str, Any]:
+def cost(sequence: FrameSequence, run: Run | None, times: Times | None) -> dict[str, Any]:
     """Fields of `MethodScore` from a run; the warm median is `times`' where it has the method.
 
     `times` count if they are of the same parameters, size and device.

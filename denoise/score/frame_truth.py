@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from onespp.denoise.geometry.correspondence import GUIDES, NOWHERE, previous_pixel
-from onespp.render.files.sequence import Reference, Sequence
+from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.frame import Frame
 
 from .causes import causes, changed_light, lengthen, moving
 
 
 @dataclass(frozen=True)
-class Ground:
+class FrameTruth:
     """A frame without its colour. What follows is None without a frame before, guides, reference.
 
     Attributes:
@@ -32,20 +32,21 @@ class Ground:
     still: np.ndarray | None = None
 
 
-def read_ground(sequence: Sequence, number: int, before: Ground | None) -> tuple[Ground, Frame]:
+def read_frame_truth(sequence: FrameSequence, number: int,
+                     before: FrameTruth | None) -> tuple[FrameTruth, Frame]:
     """The ground of a frame, and the frame itself. `before`: of the frame before, None if none."""
     wanted = ("color", *GUIDES, "albedo", "roughness")
     frame = sequence.read_frame(number, [c for c in wanted if c in sequence.manifest.channels])
     reference = sequence.read_reference(number) if sequence.has_reference(number) else None
     guided = all(name in frame for name in GUIDES)
     if before is None or not guided:
-        return Ground(frame, reference, np.ones(sequence.size, np.int64)), frame
+        return FrameTruth(frame, reference, np.ones(sequence.size, np.int64)), frame
     source = previous_pixel(before.frame, frame)
     history = lengthen(before.history, source)
     if reference is None or before.reference is None:
-        return Ground(frame, reference, history, source), frame
+        return FrameTruth(frame, reference, history, source), frame
     lit = changed_light(before.frame, frame, before.reference, reference, source)
-    return Ground(frame, reference, history, source, causes(before.frame, frame, source, lit),
+    return FrameTruth(frame, reference, history, source, causes(before.frame, frame, source, lit),
                   _still(before.frame, frame, source, lit)), frame
 
 

@@ -58,7 +58,7 @@ class ClassScore(JsonFile):
 
 
 class ErrorSplit(JsonFile):
-    """Bias and variance of display values over renders with other seeds (`bias.py`)."""
+    """Bias and variance of display values over renders with other seeds (`bias_variance.py`)."""
 
     renders: int
     frames: int

@@ -12,7 +12,7 @@ from onespp.denoise.metrics.image import Pair, non_finite, pair
 from onespp.denoise.metrics.table import MEASURES, STABILITY, measure_pair
 
 from .causes import BACKGROUND, CAUSES, HISTORIES, history_class
-from .frame_truth import Ground
+from .frame_truth import FrameTruth
 from .scorecard import ClassScore, FrameScore
 
 
@@ -38,7 +38,7 @@ class Tally:
             for name, n, s in zip(self.names, self.pixels, self.squares) if pixels}
 
 
-class Judge:
+class MethodScorer:
     """Sees a method's frames in order.
 
     Attributes:
@@ -51,9 +51,9 @@ class Judge:
         self.causes, self.histories = Tally(CAUSES), Tally(HISTORIES)
         self._before: tuple[int, Pair] | None = None
 
-    def see(self, number: int, after: int | None, image: np.ndarray, ground: Ground,
+    def see(self, number: int, after: int | None, image: np.ndarray, ground: FrameTruth,
             ms: float | None, metrics: Iterable[str]) -> None:
-        """Judge a frame.
+        """MethodScorer a frame.
 
         Args:
             after: number of the frame before it in the sequence. image: (h, w, 3) linear radiance.
@@ -76,6 +76,6 @@ class Judge:
             **values))  # pyright: ignore
 
 
-def _changes(before: Pair, now: Pair, ground: Ground) -> Mapping[str, float | None]:
+def _changes(before: Pair, now: Pair, ground: FrameTruth) -> Mapping[str, float | None]:
     step = Step(now.srgb, before.srgb, ground.source, ground.still)
     return {row.name: row.function(step) for row in STABILITY.values()}

@@ -20,37 +20,36 @@ from onespp.denoise.metrics.means import identical, mean_decibels, mean_over_fra
 from onespp.denoise.metrics.noise_floor import reference_floor
 from onespp.denoise.metrics.table import HEADLINE, MEASURES, METRICS, spread
 from onespp.denoise.metrics.tonemap import TONE_MAP
-from onespp.denoise.report.contact_sheets import Progress, draw_pictures
-from onespp.denoise.report.provenance import commands
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
 from onespp.render.files.frame_ranges import format_frames
-from onespp.render.files.sequence import Reference, Sequence
+from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.files.times import read_times
+from onespp.render.progress import Progress
 
 from .bias_variance import split_errors
+from .commands import commands
 from .cost import cost
-from .frame_truth import read_ground
+from .frame_truth import read_frame_truth
 from .scorecard import INPUT, MethodScore, Scores
-from .scorer import Judge
+from .scorer import MethodScorer
 
 MOST_LOST = 0.01
 """Share of a reference's pixels that may be non-finite; they count as no error in every image."""
 
 
-def score(sequence: Sequence, methods: list[str] | None = None, pictures: bool = True,
-          progress: Progress | None = None, seeds: list[Sequence] | None = None,
+def score(sequence: FrameSequence, methods: list[str] | None = None,
+          progress: Progress | None = None, seeds: list[FrameSequence] | None = None,
           command: str = "") -> Scores:
-    """Score a sequence, and write scores.json, scores.csv and `pictures/` into its folder.
+    """Score a sequence, and write scores.json and scores.csv into its folder.
 
     Without a reference everything but the error is reported; a method with results for some
-    frames only is scored on those, and a note says so. Scores are written before pictures.
+    frames only is scored on those, and a note says so.
 
     Args:
         methods: which to score beside the input; default: all that have results.
-        pictures: also draw contact sheets, the movie and the plot.
         progress: called with (done, total, what).
-        seeds: renders of the same with other seeds, to split errors by (`bias.py`).
+        seeds: renders of the same with other seeds, to split errors by (`bias_variance.py`).
         command: the command line, for scores.json.
 
     Raises:
@@ -69,14 +68,10 @@ def score(sequence: Sequence, methods: list[str] | None = None, pictures: bool =
         "commands": [line for line in dict.fromkeys([*made, command]) if line]})
     write_text(sequence.folder / "scores.json", scores.json_text())
     write_text(sequence.folder / "scores.csv", scores.csv_text())
-    if pictures:
-        chosen = [m for m in methods if m != INPUT] if methods else None
-        trouble = draw_pictures(sequence, scores, chosen, progress)
-        scores = scores.model_copy(update={"notes": [*scores.notes, *trouble]})
     return scores
 
 
-def measure_sequence(sequence: Sequence, methods: list[str] | None = None,
+def measure_sequence(sequence: FrameSequence, methods: list[str] | None = None,
                      progress: Progress | None = None) -> Scores:
     """The scores alone; arguments and errors as for `score`."""
     names = _methods(sequence, methods)
@@ -84,31 +79,31 @@ def measure_sequence(sequence: Sequence, methods: list[str] | None = None,
     if not frames:
         raise InputError(f"{sequence.folder} has no frames yet: render some first")
     runs = {name: sequence.read_run(name) for name in names}
-    judges = {name: Judge() for name in (INPUT, *names)}
+    scorers = {name: MethodScorer() for name in (INPUT, *names)}
     chosen = _chosen(sequence, frames)
     known: dict[int, _Known] = {}
     ground, after = None, {b: a for a, b in pairwise(sequence.frames)}
     for n, number in enumerate(frames):
         before = after.get(number)
         here = ground if n and frames[n - 1] == before else None
-        ground, frame = read_ground(sequence, number, here)
+        ground, frame = read_frame_truth(sequence, number, here)
         if ground.reference is not None:
             known[number] = _known(sequence, number, ground.reference)
         metrics = [name for name in METRICS if number in chosen[name]]
-        judges[INPUT].see(number, before, frame["color"], ground, None, metrics)
+        scorers[INPUT].see(number, before, frame["color"], ground, None, metrics)
         for name in names:
             if sequence.has_result(name, number):
-                judges[name].see(number, before, sequence.read_result(name, number), ground,
+                scorers[name].see(number, before, sequence.read_result(name, number), ground,
                                  runs[name].ms.get(number), metrics)
         if progress:
             progress(n + 1, len(frames), "score")
     times = read_times(sequence.folder)
-    methods_scored = {name: _summary(judge, judges[INPUT], cost(sequence, runs.get(name), times))
-                      for name, judge in judges.items()}
+    methods_scored = {name: _summary(judge, scorers[INPUT], cost(sequence, runs.get(name), times))
+                      for name, judge in scorers.items()}
     return _scores(sequence, frames, known, methods_scored)
 
 
-def _chosen(sequence: Sequence, frames: list[int]) -> dict[str, list[int]]:
+def _chosen(sequence: FrameSequence, frames: list[int]) -> dict[str, list[int]]:
     """Metric -> the frames that it is measured on."""
     judged = [i for i in frames if sequence.has_reference(i)]
     return {row.name: spread(judged, row.most_frames) for row in METRICS.values()}
@@ -123,7 +118,7 @@ class _Known:
     non_finite_pixels: int
 
 
-def _methods(sequence: Sequence, wanted: list[str] | None) -> list[str]:
+def _methods(sequence: FrameSequence, wanted: list[str] | None) -> list[str]:
     there = sequence.methods()
     if wanted is None:
         return there
@@ -135,7 +130,7 @@ def _methods(sequence: Sequence, wanted: list[str] | None) -> list[str]:
     return [name for name in dict.fromkeys(wanted) if name != INPUT]
 
 
-def _known(sequence: Sequence, number: int, reference: Reference) -> _Known:
+def _known(sequence: FrameSequence, number: int, reference: Reference) -> _Known:
     """InputError where so much of a reference is not finite that the rest says little."""
     lost = int(non_finite(reference.color).sum())
     if lost > MOST_LOST * reference.color[..., 0].size:
@@ -152,7 +147,7 @@ def _floor(reference: Reference) -> float | None:
     return reference_floor(reference.color, reference.variance)
 
 
-def _summary(judge: Judge, unfiltered: Judge, spent: dict[str, Any]) -> MethodScore:
+def _summary(judge: MethodScorer, unfiltered: MethodScorer, spent: dict[str, Any]) -> MethodScore:
     """`unfiltered`: the judge of the input."""
     rows = judge.rows
     means: dict[str, Any] = {}
@@ -166,7 +161,7 @@ def _summary(judge: Judge, unfiltered: Judge, spent: dict[str, Any]) -> MethodSc
         **means)
 
 
-def _scores(sequence: Sequence, frames: list[int], known: dict[int, _Known],
+def _scores(sequence: FrameSequence, frames: list[int], known: dict[int, _Known],
             methods: dict[str, MethodScore]) -> Scores:
     manifest = sequence.manifest
     floors = {frame: k.floor for frame, k in known.items() if k.floor is not None}

@@ -1,4 +1,4 @@
-"""`python -m onespp.denoise.studies.ablation DIR...`: what each part of a method is worth, as a Markdown table.
+"""What each part of a method is worth, as a Markdown table.
 
 A part is a parameter that is true or false; each row turns one of them to what it is not by
 default. Nothing is written: frames are denoised in memory, all variants side by side.
@@ -12,14 +12,12 @@ from itertools import pairwise
 from typing import Any
 
 from onespp.denoise.catalog import Method, build, channels_read, parameters
-from onespp.denoise.cli.ablate import ablation
 from onespp.denoise.metrics.means import mean_over_frames
 from onespp.denoise.metrics.table import MEASURES
-from onespp.denoise.score.frame_truth import read_ground
-from onespp.denoise.score.scorer import Judge
-from onespp.render.cli.terminal import run
+from onespp.denoise.score.frame_truth import read_frame_truth
+from onespp.denoise.score.scorer import MethodScorer
 from onespp.render.errors import InputError
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 
 COLUMNS = ("psnr_srgb", "flip", "flicker")
 WHOLE = "as it is"
@@ -46,7 +44,7 @@ def variants(name: str) -> dict[str, Method]:
                                    build(name, {part: str(not on)}) for part, on in parts.items()}}
 
 
-def ablate(sequence: Sequence, methods: dict[str, Method],
+def ablate(sequence: FrameSequence, methods: dict[str, Method],
            on_frame: Callable[[int], None] = lambda done: None) -> list[Variant]:
     """Denoise and judge the frames that have a reference.
 
@@ -57,23 +55,23 @@ def ablate(sequence: Sequence, methods: dict[str, Method],
     if not any(map(sequence.has_reference, frames)):
         raise InputError(f"{sequence.folder} has no reference to compare with: "
                          "render one with --reference-spp")
-    judges = {name: Judge() for name in methods}
+    scorers = {name: MethodScorer() for name in methods}
     states: dict[str, Any] = {name: m.init(*sequence.size) for name, m in methods.items()}
     channels = dict.fromkeys(c for m in methods.values()
                              for c in channels_read(m, sequence.manifest.channels))
     before, ground = {b: a for a, b in pairwise(sequence.frames)}, None
     for done, number in enumerate(frames):
         last = ground if done and frames[done - 1] == before.get(number) else None
-        ground, _ = read_ground(sequence, number, last)
+        ground, _ = read_frame_truth(sequence, number, last)
         frame = sequence.read_frame(number, list(channels))
         for name, method in methods.items():
             image, states[name] = method(frame, states[name])
-            judges[name].see(number, before.get(number), image, ground, None, COLUMNS[:2])
+            scorers[name].see(number, before.get(number), image, ground, None, COLUMNS[:2])
         on_frame(done + 1)
     return [Variant(name, {c: mean_over_frames(MEASURES[c], {row.frame: row[c]
                                                             for row in judge.rows})
                            for c in COLUMNS})
-            for name, judge in judges.items()]
+            for name, judge in scorers.items()]
 
 
 def markdown(method: str, results: dict[str, list[Variant]]) -> str:
@@ -93,7 +91,3 @@ def _cell(column: str, value: float | None, whole: float | None) -> str:
         return "-"
     text = format(value, MEASURES[column].format)
     return text if column != COLUMNS[0] or value == whole else f"{text} ({value - whole:+.2f})"
-
-
-if __name__ == "__main__":
-    run(ablation, name="python -m onespp.denoise.studies.ablation")

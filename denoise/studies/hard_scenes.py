@@ -16,7 +16,7 @@ from onespp.denoise.metrics.image import non_finite, pair
 from onespp.denoise.metrics.noise_floor import reference_floor
 from onespp.denoise.metrics.table import measure_pair
 from onespp.render.errors import InputError
-from onespp.render.files.sequence import Sequence as Folder
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.frame import Frame
 
 MARGIN = 0.3          # dB
@@ -71,7 +71,7 @@ class Row:
         return self.event is None or (self.recovery or 0) < len(self.psnr) - self.event
 
 
-def judge(folder: Folder, scene: str, event: int | None, diffuse: bool,
+def judge(folder: FrameSequence, scene: str, event: int | None, diffuse: bool,
           after_method: Callable[[], None] = lambda: None) -> list[Row]:
     """Rows of the input and of every method of `METHODS` for a rendered sequence.
 

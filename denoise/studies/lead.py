@@ -1,4 +1,4 @@
-"""`python -m onespp.denoise.studies.lead PLAIN OURS ...`: how far a method is ahead of a peer, as Markdown.
+"""How far a method is ahead of a peer, as Markdown.
 
 For each scene two scored folders: frames of the plain estimator, which any renderer gives, and of
 ours; the peer gets both inputs, the method the second. Everything is read from their scores.json.
@@ -9,9 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from onespp.denoise.cli.lead import lead
 from onespp.denoise.score.scorecard import MethodScore, Scores
-from onespp.render.cli.terminal import run
 from onespp.render.errors import InputError
 
 CAUSES = ("glossy", "disoccluded", "light")
@@ -26,7 +24,7 @@ class Pair:
     plain: MethodScore
 
 
-def _psnr(score: MethodScore, frame: int | None = None) -> float:
+def psnr_of(score: MethodScore, frame: int | None = None) -> float:
     value = score["psnr_srgb"] if frame is None else score.per_frame[frame]["psnr_srgb"]
     if value is None:
         raise InputError("the scores hold no PSNR: score a sequence that has a reference")
@@ -34,7 +32,7 @@ def _psnr(score: MethodScore, frame: int | None = None) -> float:
 
 
 def _worst(pair: Pair) -> float | None:
-    leads = [_psnr(pair.method, i) - _psnr(pair.peer, i)
+    leads = [psnr_of(pair.method, i) - psnr_of(pair.peer, i)
              for i in range(1, len(pair.method.per_frame))]
     return min(leads, default=None)
 
@@ -56,11 +54,11 @@ def _class_lead(cause: str) -> Callable[[Pair], float | None]:
 
 ROWS: dict[str, tuple[Callable[[Pair], float | None], str]] = {
     "mean PSNR over the peer on plain input, dB": (
-        lambda p: _psnr(p.method) - _psnr(p.plain), "+.2f"),
+        lambda p: psnr_of(p.method) - psnr_of(p.plain), "+.2f"),
     "mean PSNR over the peer on our input, dB": (
-        lambda p: _psnr(p.method) - _psnr(p.peer), "+.2f"),
+        lambda p: psnr_of(p.method) - psnr_of(p.peer), "+.2f"),
     "the same, worst frame after the first, dB": (_worst, "+.2f"),
-    "the same, first frame, dB": (lambda p: _psnr(p.method, 0) - _psnr(p.peer, 0), "+.2f"),
+    "the same, first frame, dB": (lambda p: psnr_of(p.method, 0) - psnr_of(p.peer, 0), "+.2f"),
     "FLIP, share of the peer's": (_ratio("flip"), ".2f"),
     "flicker, share of the peer's": (_ratio("flicker"), ".2f"),
     **{f"PSNR over the peer on {cause} pixels, dB": (_class_lead(cause), "+.2f")
@@ -89,7 +87,3 @@ def markdown(method: str, peer: str, scenes: dict[str, tuple[Scores, Scores]]) -
         cells = ["-" if v is None else format(v, form) for v in values]
         lines.append(f"| {row} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    run(lead, name="python -m onespp.denoise.studies.lead")

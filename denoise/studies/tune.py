@@ -24,7 +24,7 @@ from onespp.denoise.metrics.means import mean_decibels
 from onespp.denoise.metrics.tonemap import srgb_from_linear
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.frame import Frame
 
 FACTORS = (2.0, 1.4, 1.15)
@@ -42,7 +42,7 @@ class Case:
     references: list[np.ndarray]
 
 
-def read_case(sequence: Sequence, method: Method) -> Case:
+def read_case(sequence: FrameSequence, method: Method) -> Case:
     """The frames that have a reference.
 
     Raises:

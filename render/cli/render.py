@@ -10,7 +10,7 @@ from onespp.render.channels import REPLAY
 from onespp.render.errors import InputError
 from onespp.render.files.frame_ranges import parse_frames
 from onespp.render.files.lock import writing
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.host.memory import require_memory
 from onespp.scenes import catalog
 
@@ -36,7 +36,7 @@ def render(scene: str, out: Path | None, device: str, threads: int | None, **opt
 
 def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: str | None, seed: int,
               reference_spp: int | None, antialias: bool, channels: str | None,
-              direct: str, sampler: str, overwrite: bool) -> Sequence:
+              direct: str, sampler: str, overwrite: bool) -> FrameSequence:
     """Do what the options of a command ask."""
     scene = catalog.load(scene_name)
     height, width = parse_size(size) if size is not None else (scene.height, scene.width)
@@ -123,7 +123,7 @@ def export(folder: Path, out: Path | None, layout: str) -> None:
     """Write the frames of the sequence in FOLDER in another layout."""
     from onespp.render.games202.convert import export_games202
 
-    sequence = Sequence.open(folder)
+    sequence = FrameSequence.open(folder)
     out = out or folder / layout
     export_games202(sequence, out)
     click.echo(f"exported {len(sequence.frames)} frames to {out}")

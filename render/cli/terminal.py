@@ -23,7 +23,8 @@ from rich.progress import (
 )
 from rich.progress import Progress as Bar
 
-from onespp.render.errors import InputError
+from onespp.render.errors import InputError, readable
+from onespp.render.progress import Progress
 
 SECONDS_BETWEEN_LINES = 5.0
 BAD_INPUT, INTERRUPTED = 2, 130
@@ -93,11 +94,11 @@ def progress() -> Iterator[Callable[[str, float], Steps]]:
 
 
 @contextmanager
-def named_progress() -> Iterator[Callable[[int, int, str], None]]:
+def named_progress() -> Iterator[Progress]:
     """Yields `report(done, total, what)`; every new `what` is a part of the job."""
     parts: dict[str, Steps] = {}
     with progress() as begin:
-        def report(done: int, total: int, what: str) -> None:
+        def report(done: float, total: float, what: str, /) -> None:
             if what not in parts:
                 parts[what] = begin(what, total)
             parts[what].advance(done)
@@ -205,11 +206,6 @@ def _run(command: click.Command, arguments: Sequence[str] | None, name: str) -> 
     finally:  # Python is about to end, and an interrupt would only make it complain
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)
-
-
-def readable(typed: str) -> str:
-    """Text from the command line as UTF-8 can hold it, whatever bytes and locale it came in."""
-    return typed.encode(errors="surrogateescape").decode(errors="replace")
 
 
 def command_line() -> str:

@@ -41,7 +41,7 @@ _UNKNOWN = "unknown"
 
 @dataclass(frozen=True)
 class Reference:
-    """Ground truth of a frame.
+    """FrameTruth truth of a frame.
 
     Attributes:
         color: (h, w, 3) float32, linear radiance. variance: (h, w, 3) float32, of that mean.
@@ -54,7 +54,7 @@ class Reference:
 
 
 @dataclass(frozen=True)
-class Sequence:
+class FrameSequence:
     """A folder that holds a sequence. Make one with `create`, read one with `open`.
 
     All methods raise InputError for files that are missing, damaged or disagree with the
@@ -65,7 +65,7 @@ class Sequence:
     manifest: Manifest
 
     @classmethod
-    def open(cls, folder: Path | str) -> Sequence:
+    def open(cls, folder: Path | str) -> FrameSequence:
         """The sequence in a folder; InputError if there is none."""
         folder = Path(folder)
         path = folder / "manifest.json"
@@ -78,7 +78,8 @@ class Sequence:
         return cls(folder, read_json(path, Manifest))
 
     @classmethod
-    def create(cls, folder: Path | str, manifest: Manifest, overwrite: bool = False) -> Sequence:
+    def create(cls, folder: Path | str, manifest: Manifest,
+               overwrite: bool = False) -> FrameSequence:
         """The sequence in a folder, begun, or continued where it has the same settings.
 
         When continued it keeps its files; its frames become the old and the new ones together,
@@ -169,15 +170,15 @@ class Sequence:
         """Samples a pixel of a frame's reference, None where it came from elsewhere."""
         return self._spp(self._path("reference", i))
 
-    def with_reference_spp(self) -> Sequence:
+    def with_reference_spp(self) -> FrameSequence:
         """The same with its manifest's `reference_spp` as its references have it now."""
-        fewest = min((self.reference_spp(i) for i in self.frames if self.has_reference(i)),
-                     default=None)
+        known = [self.reference_spp(i) for i in self.frames if self.has_reference(i)]
+        fewest = min((spp for spp in known if spp is not None), default=None)
         if fewest == self.manifest.reference_spp:
             return self
         manifest = self.manifest.model_copy(update={"reference_spp": fewest})
         write_text(self.folder / "manifest.json", format_json(manifest))
-        return Sequence(self.folder, manifest)
+        return FrameSequence(self.folder, manifest)
 
     def read_reference(self, i: int) -> Reference:
         path = self._path("reference", i)

@@ -1,4 +1,4 @@
-"""times.json: what methods took, measured in turns (`interleave.py`)."""
+"""times.json: what methods took, measured in turns (`run/interleaved_timing.py`)."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@
 |                                          | object by ID, camera from world, screen from world |
 | result_%d.exr                            | what a program makes of it, channels R, G, B, half |
 
-Frames count from 0, unpadded (an import takes more names, see `games202_files.py`). Screen: x
+Frames count from 0, unpadded (an import takes more names, see `layout.py`). Screen: x
 right, y down, pixel centres at + 0.5, fourth component the depth, which is camera-space z: as in
 `render/frame.py`. Background: ID -1, normal, depth and beauty 0, position the camera's origin.
 
@@ -37,7 +37,7 @@ from onespp.render.files.exr import read_exr, read_header, write_exr
 from onespp.render.files.frame_ranges import format_frames
 from onespp.render.files.json_file import checked
 from onespp.render.files.manifest import Manifest, Run, check_result_name
-from onespp.render.files.sequence import Reference, Sequence, object_ids
+from onespp.render.files.sequence import FrameSequence, Reference, object_ids
 from onespp.render.frame import Frame
 
 from .conventions import check_frame, check_motion
@@ -56,10 +56,10 @@ RESULTS = "result"
 def import_games202(folder: Path | str, out: Path | str, *, scene: str | None = None,
                     fps: float = 24.0, overwrite: bool = False, command: str = "",
                     check: bool = True,
-                    tell: Callable[[str], None] = lambda note: None) -> Sequence:
+                    tell: Callable[[str], None] = lambda note: None) -> FrameSequence:
     """Read all frames of a folder in the assignment's layout into a new sequence at `out`.
 
-    Results and references beside the frames come along (`games202_files.py`): results as those of
+    Results and references beside the frames come along (`layout.py`): results as those of
     `RESULTS`, references with unknown samples and variance.
 
     Args:
@@ -89,7 +89,7 @@ def import_games202(folder: Path | str, out: Path | str, *, scene: str | None = 
     name = scene or found.name
     digits = len(str(objects - 1))
     new = not (Path(out) / "manifest.json").exists()
-    sequence = Sequence.create(out, checked(
+    sequence = FrameSequence.create(out, checked(
         Manifest, f"the sequence to make of {folder}", source="games202", scene=name,
         fingerprint=digest.hexdigest(), frames=tuple(frames), width=header.width,
         height=header.height, fps=fps, seed=None, channels=tuple(_FILES),
@@ -136,7 +136,7 @@ def _check_convention(found: Found, frame: Frame, before: Frame | None = None) -
                          "as they are)") from None
 
 
-def _take_references(found: Found, sequence: Sequence, tell: Callable[[str], None]) -> None:
+def _take_references(found: Found, sequence: FrameSequence, tell: Callable[[str], None]) -> None:
     taken = [i for i in found.references if i in sequence.frames]
     for i in taken:
         color = _image(found.references[i], _RGB, sequence.size)
@@ -147,7 +147,7 @@ def _take_references(found: Found, sequence: Sequence, tell: Callable[[str], Non
     _tell_strangers("references", found.references, sequence, tell)
 
 
-def _take_results(found: Found, sequence: Sequence, tell: Callable[[str], None]) -> None:
+def _take_results(found: Found, sequence: FrameSequence, tell: Callable[[str], None]) -> None:
     taken = [i for i in found.results if i in sequence.frames]
     if taken:
         sequence.remove_results(RESULTS)
@@ -159,7 +159,7 @@ def _take_results(found: Found, sequence: Sequence, tell: Callable[[str], None])
     _tell_strangers("results", found.results, sequence, tell)
 
 
-def _tell_strangers(what: str, files: Mapping[int, Path], sequence: Sequence,
+def _tell_strangers(what: str, files: Mapping[int, Path], sequence: FrameSequence,
                     tell: Callable[[str], None]) -> None:
     strangers = [i for i in files if i not in sequence.frames]
     if strangers:
@@ -170,7 +170,7 @@ def _run_of_files(folder: Path) -> Run:
     return Run(method="files", parameters={"source": f"result files in {folder.resolve().name}"})
 
 
-def export_games202(sequence: Sequence, folder: Path | str) -> list[Path]:
+def export_games202(sequence: FrameSequence, folder: Path | str) -> list[Path]:
     """Write a sequence's frames in the assignment's layout; the files written.
 
     Frames are numbered from 0 in the sequence's order. All are written, or none.
@@ -202,7 +202,7 @@ def export_games202(sequence: Sequence, folder: Path | str) -> list[Path]:
     return written
 
 
-def import_result(sequence: Sequence, folder: Path | str, method: str) -> list[int]:
+def import_result(sequence: FrameSequence, folder: Path | str, method: str) -> list[int]:
     """Take another program's `result_%d.exr` as the results of `method`; the frames found.
 
     Result k belongs to the sequence's k-th frame, as `export_games202` numbers them. How long
@@ -229,7 +229,7 @@ def import_result(sequence: Sequence, folder: Path | str, method: str) -> list[i
     return [frames[k] for k in files]
 
 
-def export_results(sequence: Sequence, method: str, folder: Path | str) -> list[Path]:
+def export_results(sequence: FrameSequence, method: str, folder: Path | str) -> list[Path]:
     """Write a method's results as `result_%d.exr`, half, all or none; the files written.
 
     Raises:

@@ -119,7 +119,7 @@ def prepare() -> None:
     """
     if "drjit" in sys.modules and (loaded := _loaded_llvm()) and not loaded.usable:
         raise InputError(f"drjit was imported first and has loaded the LLVM at {loaded.path}, with "
-                         "which it would crash: import render or denoise before drjit and mitsuba")
+                         "which it would crash: import onespp.render before drjit and mitsuba")
     if _SET_BY_USER is None and (llvm := find_llvm()) and llvm.usable:
         os.environ["DRJIT_LIBLLVM_PATH"] = llvm.path
 

@@ -1,4 +1,4 @@
-"""A scene description set up as a live Mitsuba scene, posed at one frame at a time.
+"""A scene description set up as a live Mitsuba scene, set to one frame at a time.
 
 Traps that this file exists for:
 - `load_dict` reorders and merges shapes unless `parallel` and `optimize` are off;
@@ -31,6 +31,7 @@ from onespp.scenes.description import (
 )
 
 from . import plugins
+from .aligned import aligned
 from .appearance import Appearance
 from .variant import mi
 
@@ -41,7 +42,7 @@ _DOT = 1e-7      # half the size of what has none, in stage units
 _ANALYTIC = {Sphere: "sphere", Rectangle: "rectangle", Disk: "disk", Cylinder: "cylinder"}
 
 
-class Stage:
+class MitsubaScene:
     """The Mitsuba scene of a description.
 
     Attributes:
@@ -49,7 +50,7 @@ class Stage:
         origin: (3,) float64, world space. unit: a stage unit's length in world units; a point of
             the world is `origin + unit * (its point in stage space)`.
         id_from_registry: UInt32 table, registry index of a shape -> object ID.
-        frame: the frame it is posed at.
+        frame: the frame it is set to.
     """
 
     def __init__(self, description: Scene, frame: float = 0) -> None:
@@ -71,7 +72,7 @@ class Stage:
         self.id_from_registry = self._registry_table()
         self._move(frame)  # an updated scene differs from a loaded one by roundings of its rays
 
-    def pose(self, frame: float) -> None:
+    def set_frame(self, frame: float) -> None:
         """Move what moves to where it is at `frame`. Nothing happens if it is there already."""
         if frame != self.frame:
             self._move(frame)
@@ -191,7 +192,7 @@ class Stage:
         table = np.zeros(max(registry_index.values()) + 1, np.uint32)
         for object_id, name in enumerate(self.description.object_names):
             table[registry_index[self._ids[name]]] = object_id
-        return mi.UInt32(table)
+        return aligned(mi.UInt32, table)
 
 
 def _registry_index(shape: Any) -> int:
@@ -240,7 +241,7 @@ def _placed(mesh: Mesh, matrix: np.ndarray) -> dict[str, Any]:
     faces = mesh.faces[:, ::-1] if _mirrors(matrix) else mesh.faces
     placed: dict[str, Any] = {
         "vertex_positions": _buffer(mesh.vertices @ linear.T + matrix[:3, 3]),
-        "faces": mi.UInt32(np.ascontiguousarray(faces).ravel()),
+        "faces": aligned(mi.UInt32, np.asarray(faces, np.uint32)),
     }
     if mesh.normals is not None:
         normals = mesh.normals @ _cofactors(linear).T * (-1 if _mirrors(matrix) else 1)
@@ -256,4 +257,4 @@ def _cofactors(linear: np.ndarray) -> np.ndarray:
 
 
 def _buffer(array: np.ndarray) -> mi.Float:
-    return mi.Float(array.astype(np.float32).ravel())
+    return aligned(mi.Float, array.astype(np.float32))

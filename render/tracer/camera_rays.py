@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import drjit as dr
 import numpy as np
 
-from onespp.render.mitsuba.scene import Stage
+from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Camera
 
@@ -50,7 +50,7 @@ class PixelRays:
         return mi.Ray3f(self.origin, direction * scale), scale * self.unit
 
 
-def pixel_rays(stage: Stage, height: int, width: int) -> PixelRays:
+def pixel_rays(stage: MitsubaScene, height: int, width: int) -> PixelRays:
     """The camera's rays at the stage's frame, in the stage's space."""
     camera = stage.description.camera
     world_from_camera = camera.world_from_camera_at(stage.frame)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import drjit as dr
 
-from onespp.render.mitsuba.scene import Stage
+from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 
 
@@ -18,7 +18,7 @@ from onespp.render.mitsuba.variant import mi
 class PrimaryHit:
     """The first hit of a camera ray. `si` is in the stage's space."""
 
-    stage: Stage
+    stage: MitsubaScene
     si: mi.SurfaceInteraction3f
     depth_per_length: mi.Float
 

@@ -31,7 +31,7 @@ class Radiance:
     hit_distance: from the first hit to the next, 0 if there is none. hit_shape: the shape met
     there, its index in the JIT registry, 0 if there is none.
     `unshadowed`, `visibility` and `shadow_ray` are there if direct light was resampled: see
-    `render/lights.py`.
+    `render/tracer/lights.py`.
     """
 
     emission: mi.Color3f

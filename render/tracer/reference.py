@@ -30,7 +30,7 @@ MOST_SAMPLES = 1 << 24
 
 
 @dataclass
-class Progress:
+class SampleSums:
     """Sums over the passes done so far, float64 (h, w, 3). Enough to go on from.
 
     total: sum n_k m_k. squares: sum n_k m_k^2.
@@ -42,7 +42,7 @@ class Progress:
     samples: int = 0
 
     @classmethod
-    def start(cls, height: int, width: int) -> Progress:
+    def start(cls, height: int, width: int) -> SampleSums:
         return cls(np.zeros((height, width, 3)), np.zeros((height, width, 3)))
 
     def add(self, sample_sum: np.ndarray, samples: int) -> None:
@@ -53,7 +53,7 @@ class Progress:
         self.samples += samples
 
     @classmethod
-    def of(cls, reference: Reference, passes: int) -> Progress:
+    def of(cls, reference: Reference, passes: int) -> SampleSums:
         """What a finished reference amounts to, but for its rounding to float32."""
         mean, samples = reference.color.astype(np.float64), reference.spp or 0
         spread = reference.variance.astype(np.float64) * (passes - 1) * samples
@@ -84,8 +84,8 @@ def pass_sizes(spp: int, pixels: int = 1) -> list[int]:
 
 
 def render_reference(renderer: Renderer, index: int, seed: int, spp: int, *,
-                     antialias: bool = False, progress: Progress | None = None,
-                     after_pass: Callable[[Progress], None] = lambda progress: None) -> Reference:
+                     antialias: bool = False, progress: SampleSums | None = None,
+                     after_pass: Callable[[SampleSums], None] = lambda progress: None) -> Reference:
     """The reference of one frame.
 
     Args:
@@ -93,7 +93,7 @@ def render_reference(renderer: Renderer, index: int, seed: int, spp: int, *,
             an undisturbed one.
         after_pass: called after every pass, to show or save the progress.
     """
-    progress = progress or Progress.start(renderer.height, renderer.width)
+    progress = progress or SampleSums.start(renderer.height, renderer.width)
     for size in pass_sizes(spp, renderer.height * renderer.width)[progress.passes:]:
         progress.add(renderer.sample_sum(index, seed, progress.passes, size, antialias), size)
         after_pass(progress)

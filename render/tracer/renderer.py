@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import drjit as dr
@@ -11,53 +11,18 @@ import numpy as np
 from onespp.render.channels import FRAME, GLOSS, RADIANCE, REPLAY, SHADOW, SPLIT
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
-from onespp.render.mitsuba.scene import Stage
 from onespp.render.mitsuba.variant import mi
-from onespp.scenes.description import Scene
 
-from .camera_rays import camera_matrices, pixel_rays
+from .camera_rays import camera_matrices
 from .gbuffer import GBUFFER, PrimaryHit
 from .path import trace
 from .replay import replay
-from .sampler import (
-    FRAME_STREAM,
-    REFERENCE_STREAM,
-    BlueNoise,
-    Keys,
-    Pcg,
-    Sampler,
-    Sobol,
-    keys_from_seed,
-    z_order,
-)
-
-DIRECT = ("mis", "resampled")
-SAMPLERS: dict[str, Callable[[Keys, Any, int], Sampler]] = {
-    "pcg": lambda keys, pixel, width: Pcg(keys, pixel),
-    "zsobol": lambda keys, pixel, width: Sobol(keys, mi.UInt32(0),
-                                               z_order(pixel % width, pixel // width)),
-    "bluenoise": lambda keys, pixel, width: BlueNoise(keys, pixel % width, pixel // width),
-}
+from .sampler import FRAME_STREAM, REFERENCE_STREAM, Sobol, keys_from_seed
+from .view import View
 
 
-class Renderer:
-    """A scene at one size, ready to render any of its frames in any order.
-
-    Raises:
-        InputError: a size below 1x1.
-        SceneError: a scene that Mitsuba cannot build.
-    """
-
-    def __init__(self, scene: Scene, height: int, width: int, *, direct: str = "mis",
-                 sampler: str = "pcg") -> None:
-        for option, value, known in (("direct", direct, DIRECT), ("sampler", sampler, SAMPLERS)):
-            if value not in known:
-                raise InputError(f"unknown --{option} '{value}': use {' or '.join(known)}")
-        self.direct, self.sampler = direct, sampler
-        if height < 1 or width < 1:
-            raise InputError(f"the size {width}x{height} is empty: use at least 1x1")
-        self.scene, self.height, self.width = scene, height, width
-        self.stage = Stage(scene)
+class Renderer(View):
+    """A view of a scene, ready to render any of its frames in any order."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -74,7 +39,7 @@ class Renderer:
         """One frame at 1 spp: one kernel, only the channels asked for.
 
         The result depends on (scene, index, seed, size) alone, and never on which other frames
-        are rendered: the channels of `gradient.py` replay frame `index` - 1, whether or not it is
+        are rendered: the channels of `replay.py` replay frame `index` - 1, whether or not it is
         asked for, and frame 0 has nothing to replay.
         """
         if not self._splits and set(channels) & {*SPLIT, *SHADOW}:
@@ -82,7 +47,7 @@ class Renderer:
                              "and a scene of max_depth 2 or more")
         before = index - 1 if index > 0 else None
         replayed = replay(self, index, before, seed) if set(channels) & set(REPLAY) else {}
-        self.stage.pose(index)
+        self.stage.set_frame(index)
         planes = self._trace_frame(index, seed, [c for c in channels if c not in REPLAY])
         dr.eval(planes)
         matrices = camera_matrices(self.scene.camera, index, self.height, self.width)
@@ -102,22 +67,18 @@ class Renderer:
         Returns:
             (h, w, 3) float32, linear radiance times `count`.
         """
-        self.stage.pose(index)
+        self.stage.set_frame(index)
         with dr.suspend_grad():
             color = self._trace_samples(index, seed, number, count, antialias)
         dr.eval(color)
         return self._image(color)
 
-    def new_sampler(self, keys: Keys, pixel: mi.UInt32) -> Sampler:
-        """The random numbers of pixels."""
-        return SAMPLERS[self.sampler](keys, pixel, self.width)
-
     def _trace_frame(self, index: int, seed: int, channels: Sequence[str]) -> dict:
         with dr.suspend_grad():
             scene = self.stage.mi_scene
             pixel = dr.arange(mi.UInt32, self.height * self.width)
-            rays = pixel_rays(self.stage, self.height, self.width)
-            ray, depth_per_length = rays.at(*self._centres(pixel))
+            rays = self.rays()
+            ray, depth_per_length = rays.at(*self.centres(pixel))
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
             planes = {}
             if set(channels) & {*RADIANCE, *SPLIT, *SHADOW, *GLOSS}:
@@ -152,9 +113,9 @@ class Renderer:
     def _trace_samples(self, index: int, seed: int, number: int, count: int, antialias: bool):
         scene = self.stage.mi_scene
         pixel = dr.arange(mi.UInt32, self.height * self.width)
-        rays = pixel_rays(self.stage, self.height, self.width)
+        rays = self.rays()
         keys = keys_from_seed(seed, REFERENCE_STREAM, index, number)
-        x, y = self._centres(pixel)
+        x, y = self.centres(pixel)
         centre_ray, _ = rays.at(x, y)
         centre_pi = scene.ray_intersect_preliminary(centre_ray, coherent=True)
         sample = mi.UInt32(0)
@@ -171,10 +132,6 @@ class Renderer:
             color += radiance.emission + radiance.direct + radiance.indirect
             sample += 1
         return color
-
-    def _centres(self, pixel: mi.UInt32) -> tuple[mi.Float, mi.Float]:
-        row = pixel // self.width
-        return mi.Float(pixel - row * self.width) + 0.5, mi.Float(row) + 0.5
 
     def _image(self, value: object) -> np.ndarray:
         """(h, w) or (h, w, 3) NumPy copy of evaluated planes."""

@@ -17,19 +17,17 @@ more, so that the frame's own samples stay independent.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import drjit as dr
 import numpy as np
 
+from onespp.render.mitsuba.aligned import aligned
 from onespp.render.mitsuba.variant import mi
 
-from .camera_rays import camera_matrices, pixel_rays
+from .camera_rays import camera_matrices
 from .path import trace
 from .sampler import FRAME_STREAM, GRADIENT_STREAM, keys_from_seed
-
-if TYPE_CHECKING:
-    from .renderer import Renderer
+from .view import View
 
 STRATUM = 3          # pixels, side
 NO_SAMPLE = -1.0     # luminance where there is none
@@ -45,47 +43,46 @@ class _Shaded:
     seen: mi.Bool
 
 
-def replay(renderer: Renderer, index: int, previous: int | None,
+def replay(view: View, index: int, previous: int | None,
            seed: int) -> dict[str, np.ndarray]:
     """The channels `replay` and `replay_before` of a frame, (h, w, 2) each.
 
     Args:
         previous: the frame before it, None for the first, which has no samples.
     """
-    size = renderer.height, renderer.width
+    size = view.height, view.width
     now, before = (np.full((*size, 2), NO_SAMPLE, np.float32) for _ in range(2))
     if previous is not None:
-        row, column, shaded_now, shaded_before = _shade_both(renderer, index, previous, seed)
+        row, column, shaded_now, shaded_before = _shade_both(view, index, previous, seed)
         now[row, column], before[row, column] = shaded_now, shaded_before
     return {"replay": now, "replay_before": before}
 
 
-def _shade_both(renderer: Renderer, index: int, previous: int,
+def _shade_both(view: View, index: int, previous: int,
                 seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Row and column in this frame, luminances (n, 2) now and before, of the samples seen."""
-    stage = renderer.stage
-    stage.pose(previous)
-    pixel = mi.UInt32(_picks(renderer.height, renderer.width, seed, previous))
-    rays = pixel_rays(stage, renderer.height, renderer.width)
-    row = pixel // renderer.width
-    ray, _ = rays.at(mi.Float(pixel - row * renderer.width) + 0.5, mi.Float(row) + 0.5)
+    stage = view.stage
+    stage.set_frame(previous)
+    pixel = aligned(mi.UInt32, _picks(view.height, view.width, seed, previous))
+    rays = view.rays()
+    ray, _ = rays.at(*view.centres(pixel))
     with dr.suspend_grad():
         si = stage.mi_scene.ray_intersect(ray)
         point, id_ = mi.Point3f(si.p), stage.object_id(dr.reinterpret_array(mi.UInt32, si.shape))
     dr.eval(point, id_)
     old_places = stage.world_from_object()
-    old = _shade(renderer, previous, seed, pixel, point, id_)
-    stage.pose(index)
+    old = _shade(view, previous, seed, pixel, point, id_)
+    stage.set_frame(index)
     point = _moved(point, id_, stage.stage_from_stage(old_places))
-    new = _shade(renderer, previous, seed, pixel, point, id_)
+    new = _shade(view, previous, seed, pixel, point, id_)
 
-    camera = camera_matrices(renderer.scene.camera, index, renderer.height, renderer.width)
+    camera = camera_matrices(view.scene.camera, index, view.height, view.width)
     at = np.nan_to_num(point.numpy().astype(np.float64).T)
     world = stage.origin + stage.unit * at
     screen = world @ camera.screen_from_world[:, :3].T + camera.screen_from_world[:, 3]
     seen = old.seen.numpy() & new.seen.numpy() & (screen[:, 3] > 0)
     column, row = np.floor(screen[:, :2] / np.where(seen, screen[:, 3], np.inf)[:, None]).T
-    seen &= (column >= 0) & (row >= 0) & (column < renderer.width) & (row < renderer.height)
+    seen &= (column >= 0) & (row >= 0) & (column < view.width) & (row < view.height)
     row, column = (a[seen].astype(np.int64) for a in (row, column))
     now, before = (np.stack([s.direct.numpy(), s.indirect.numpy()], -1)[seen] for s in (new, old))
     return row, column, now, before
@@ -102,7 +99,7 @@ def _picks(height: int, width: int, seed: int, frame: int) -> np.ndarray:
 
 def _moved(point: mi.Point3f, id_: mi.Int32, matrices: np.ndarray) -> mi.Point3f:
     """Points moved with their objects; exactly what they were if those stand still."""
-    table = mi.Float(np.ascontiguousarray(matrices[:, :3], np.float32).ravel())
+    table = aligned(mi.Float, matrices[:, :3].astype(np.float32))
     start = mi.UInt32(dr.maximum(id_, 0)) * 12
     rows = [[dr.gather(mi.Float, table, start + 4 * r + c) for c in range(4)] for r in range(3)]
     moved = mi.Point3f(*(dr.fma(a, point.x, dr.fma(b, point.y, dr.fma(c, point.z, d)))
@@ -111,21 +108,21 @@ def _moved(point: mi.Point3f, id_: mi.Int32, matrices: np.ndarray) -> mi.Point3f
     return moved
 
 
-def _shade(renderer: Renderer, random_frame: int, seed: int, pixel: mi.UInt32, point: mi.Point3f,
+def _shade(view: View, random_frame: int, seed: int, pixel: mi.UInt32, point: mi.Point3f,
            id_: mi.Int32) -> _Shaded:
     """What the camera of the posed frame sees at points, with a frame's random numbers."""
-    stage, scene = renderer.stage, renderer.stage.mi_scene
+    stage, scene = view.stage, view.stage.mi_scene
     with dr.suspend_grad():
-        origin = pixel_rays(stage, renderer.height, renderer.width).origin
+        origin = view.rays().origin
         toward = point - origin
         distance = dr.norm(toward)
         ray = mi.Ray3f(origin, toward / distance)
         pi = scene.ray_intersect_preliminary(ray, coherent=True)
         met = stage.object_id(dr.reinterpret_array(mi.UInt32, pi.shape))
         seen = (id_ >= 0) & (met == id_) & (dr.abs(pi.t - distance) < TOLERANCE * distance)
-        sampler = renderer.new_sampler(keys_from_seed(seed, FRAME_STREAM, random_frame), pixel)
-        radiance = trace(scene, ray, pi, sampler, renderer.scene.max_depth,
-                         renderer.direct == "resampled")
+        sampler = view.new_sampler(keys_from_seed(seed, FRAME_STREAM, random_frame), pixel)
+        radiance = trace(scene, ray, pi, sampler, view.scene.max_depth,
+                         view.direct == "resampled")
         shaded = _Shaded(mi.luminance(radiance.direct), mi.luminance(radiance.indirect), seen)
     dr.eval(shaded.direct, shaded.indirect, shaded.seen)
     return shaded

@@ -15,6 +15,7 @@ from typing import ClassVar, Protocol
 import drjit as dr
 import numpy as np
 
+from onespp.render.mitsuba.aligned import aligned
 from onespp.render.mitsuba.variant import mi
 
 from . import bluenoise
@@ -124,7 +125,7 @@ class BlueNoise:
         self.mask, self.x, self.y = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
         self.key, self.fine, self.dimension = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
         if keys is not None:
-            self.mask = mi.UInt32(bluenoise.mask().astype(np.uint32).ravel())
+            self.mask = aligned(mi.UInt32, bluenoise.mask().astype(np.uint32))
             self.x, self.y = mi.UInt32(x), mi.UInt32(y)
             a, b = mi.sample_tea_32(keys[0], keys[1])
             self.key = mi.UInt32(a ^ b)

@@ -13,7 +13,7 @@ from onespp.denoise.metrics.table import STABILITY
 from onespp.denoise.score.causes import CAUSES, HISTORIES
 from onespp.denoise.score.sequence import score
 from onespp.render.files.manifest import Manifest, Run
-from onespp.render.files.sequence import Reference, Sequence
+from onespp.render.files.sequence import FrameSequence, Reference
 from tests.support.frames import make_frame, translation
 
 H, W, COUNT = 24, 30, 4
@@ -21,9 +21,9 @@ CHANNELS = ("color", "albedo", "normal", "position", "depth", "id")
 
 
 @pytest.fixture
-def sequence(tmp_path) -> Sequence:
+def sequence(tmp_path) -> FrameSequence:
     """A board that moves before a wall; `half` has no error but on the board, `dark` is black."""
-    made = Sequence.create(tmp_path / "a", Manifest(
+    made = FrameSequence.create(tmp_path / "a", Manifest(
         scene="board", frames=tuple(range(COUNT)), width=W, height=H, reference_spp=64,
         channels=CHANNELS, objects=("wall", "board")))
     for i in range(COUNT):
@@ -40,7 +40,7 @@ def sequence(tmp_path) -> Sequence:
 
 
 def test_the_error_of_a_method_stands_where_it_was_made(sequence):
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     half, dark = (scores.methods[name] for name in ("half", "dark"))
     assert list(half.by_cause) == list(CAUSES)
     assert list(half.by_history) == list(HISTORIES)
@@ -57,7 +57,7 @@ def test_the_error_of_a_method_stands_where_it_was_made(sequence):
 
 
 def test_measures_of_change_begin_with_the_second_frame(sequence):
-    half = score(sequence, pictures=False).methods["half"]
+    half = score(sequence).methods["half"]
     for name in STABILITY:
         assert half.per_frame[0][name] is None
         assert all(row[name] is not None for row in half.per_frame[1:])
@@ -67,10 +67,10 @@ def test_measures_of_change_begin_with_the_second_frame(sequence):
 
 def test_a_gap_in_the_frames_is_no_step(sequence):
     (sequence.folder / "denoised/half/0001.exr").unlink()
-    half = score(sequence, pictures=False).methods["half"]
+    half = score(sequence).methods["half"]
     assert [row["flicker"] is None for row in half.per_frame] == [True, True, False]
     (sequence.folder / "frames/0002.exr").unlink()
-    dark = score(sequence, pictures=False).methods["dark"]
+    dark = score(sequence).methods["dark"]
     assert [row["flicker"] is None for row in dark.per_frame] == [True, False, True]
 
 

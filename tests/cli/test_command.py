@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 
 SCENE = '''
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
@@ -77,7 +77,7 @@ def test_parameters_and_names_make_results_side_by_side(call, scene_file, tmp_pa
     assert call("denoise", out, "--method", "atrous", "--method", "bilateral")[0] == 0
     assert call("denoise", out, "--method", "bilateral", "--set", "radius=1",
                 "--name", "small")[0] == 0
-    sequence = Sequence.open(out)
+    sequence = FrameSequence.open(out)
     assert sequence.methods() == ["atrous", "bilateral", "small"]
     assert sequence.read_run("small").parameters["radius"] == 1
     assert (sequence.read_result("small", 0) != sequence.read_result("bilateral", 0)).any()
@@ -89,7 +89,7 @@ def test_results_of_other_parameters_are_not_mixed(call, scene_file, tmp_path):
     call("denoise", out, "--method", "bilateral")
     (out / "frames/0002.exr").unlink()
     call("denoise", out, "--method", "bilateral", "--set", "radius=1")
-    assert not Sequence.open(out).has_result("bilateral", 2)
+    assert not FrameSequence.open(out).has_result("bilateral", 2)
 
 
 def test_a_sequence_without_reference_reports_all_but_the_error(call, scene_file, tmp_path):
@@ -108,7 +108,7 @@ def test_games202_files_make_the_round_trip(call, scene_file, tmp_path):
     assert call("export", tmp_path / "a", "--format", "games202", "--out", tmp_path / "g")[0] == 0
     assert call("import", tmp_path / "g", "--out", tmp_path / "b")[0] == 0
     assert call("denoise", tmp_path / "b")[0] == 0
-    ours, theirs = Sequence.open(tmp_path / "a"), Sequence.open(tmp_path / "b")
+    ours, theirs = FrameSequence.open(tmp_path / "a"), FrameSequence.open(tmp_path / "b")
     assert (ours.read_frame(1)["color"] == theirs.read_frame(1)["color"]).all()
 
 
@@ -118,7 +118,7 @@ def test_running_again_with_more_frames_goes_on(call, scene_file, tmp_path):
     before = (out / "frames/0000.exr").stat().st_mtime_ns
     assert call("render", scene_file, "--out", out, "--frames", "0:3")[0] == 0
     assert (out / "frames/0000.exr").stat().st_mtime_ns == before
-    assert Sequence.open(out).frames == [0, 1, 2]
+    assert FrameSequence.open(out).frames == [0, 1, 2]
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
@@ -166,8 +166,8 @@ def test_a_damaged_frame_is_named_and_other_results_are_kept(call, scene_file, t
     frame = out / "frames/0001.exr"
     frame.write_bytes(frame.read_bytes()[:700])
     refused(call("denoise", out, "--method", "bilateral"), "0001.exr")
-    assert Sequence.open(out).has_result("bilateral", 0)
-    assert Sequence.open(out).has_result("atrous", 2)
+    assert FrameSequence.open(out).has_result("bilateral", 0)
+    assert FrameSequence.open(out).has_result("atrous", 2)
 
 
 def test_another_sequence_is_not_overwritten_unasked(call, scene_file, tmp_path):
@@ -204,9 +204,9 @@ def test_a_stopped_render_ends_in_a_sentence_and_goes_on_to_the_same_bytes(
     assert not list((tmp_path / "stopped").rglob("*.npz"))
 
 
-def test_both_packages_run_as_modules(tmp_path, scene_file):
+def test_the_package_runs_as_a_module(tmp_path, scene_file):
     for arguments in (["render", str(scene_file), "--out", str(tmp_path / "a"), "--frames", "0"],
                       ["denoise", str(tmp_path / "a"), "--method", "atrous"]):
-        done = subprocess.run([sys.executable, "-m", *arguments], capture_output=True, text=True,
-                              check=False)
+        done = subprocess.run([sys.executable, "-m", "onespp", *arguments], capture_output=True,
+                              text=True, check=False)
         assert done.returncode == 0, done.stderr

@@ -18,15 +18,15 @@ from onespp.denoise.run.sequence import denoise_sequence
 from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Run, check_result_name
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.games202.convert import import_result
 from tests.support.made_sequence import make_sequence
 from tests.support.report_sequence import make_report_sequence
 
 
-def table(sequence: Sequence) -> str:
+def table(sequence: FrameSequence) -> str:
     text = io.StringIO()
-    print_scores(score(sequence, pictures=False), Console(width=200, file=text))
+    print_scores(score(sequence), Console(width=200, file=text))
     return text.getvalue()
 
 
@@ -54,7 +54,7 @@ def test_results_that_an_older_version_called_input_are_not_averaged_with_the_in
     sequence = make_sequence(tmp_path / "made")
     (sequence.folder / "denoised/fine").rename(sequence.folder / "denoised/input")
     with pytest.raises(InputError, match="tables call the noisy frames so"):
-        score(sequence, pictures=False)
+        score(sequence)
 
 
 @pytest.mark.parametrize("name", ["onespp", "OneSPP", "svgf", "oidn-high", "onespp+outliers"])
@@ -81,7 +81,7 @@ def test_a_run_says_what_ran_and_the_table_too(sequence):
     assert "mine (atrous)" in text
     assert "mine ran with levels=2 instead of the default." in text
     assert "atrous (" not in text.replace("mine (atrous)", "")
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     assert scores.methods["mine"].method == "atrous"
     made = {m["name"]: dict(m["parameters"]) for m in provenance(sequence, scores)["methods"]}
     assert made["mine"]["method"] == "atrous"

@@ -1,7 +1,7 @@
 """Feeds damaged files to every reader: each must be read, or be refused in one sentence.
 
-    python tests/fuzz.py 20000              # inputs for each reader
-    python tests/fuzz.py 20000 --seed 7 exr mat
+    python -m tests.robustness.fuzz 20000              # inputs for each reader
+    python -m tests.robustness.fuzz 20000 --seed 7 exr mat
 
 Every input is a good file with a few changes: cut off, bytes flipped, numbers replaced by hostile
 ones in either byte order, pieces removed, doubled or made up; in JSON also values, keys and types.
@@ -34,7 +34,7 @@ from onespp.denoise.score.scorecard import read_scores
 from onespp.denoise.score.sequence import measure_sequence
 from onespp.render.errors import InputError
 from onespp.render.files import exr
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.files.times import read_times
 from onespp.render.games202.convert import export_games202, import_games202, read_mat
 from onespp.scenes import catalog
@@ -71,7 +71,7 @@ def _exr(folder: Path) -> Path:
 def _read_exr(path: Path) -> None:
     images, header = exr.read_exr(path)
     assert all(image.shape == (header.height, header.width) for image in images.values())
-    Sequence.open(path.parents[1]).read_frame(0)
+    FrameSequence.open(path.parents[1]).read_frame(0)
 
 
 def _partial(folder: Path) -> Path:
@@ -85,7 +85,7 @@ def _partial(folder: Path) -> Path:
 def _read_partial(path: Path) -> None:
     from onespp.render.job import RenderJob, _saved_progress
 
-    sequence = Sequence.open(path.parents[1])
+    sequence = FrameSequence.open(path.parents[1])
     _saved_progress(RenderJob(catalog.load("box"), (0,), *sequence.size, reference_spp=16),
                     sequence, 0)
 
@@ -107,7 +107,7 @@ def _scored(folder: Path) -> Path:
 
 def _read_scores(path: Path) -> None:
     scores = read_scores(path)
-    render_page(Sequence.open(path.parent), scores, {})
+    render_page(FrameSequence.open(path.parent), scores, {})
     comparison(scores, scores)
     scores.csv_text()
 
@@ -117,7 +117,7 @@ def _run(folder: Path) -> Path:
 
 
 def _read_run(path: Path) -> None:
-    sequence = Sequence.open(path.parents[2])
+    sequence = FrameSequence.open(path.parents[2])
     cost(sequence, sequence.read_run("fine"), None)
 
 
@@ -134,7 +134,7 @@ def _times(folder: Path) -> Path:
 
 
 def _read_times(path: Path) -> None:
-    sequence = Sequence.open(path.parent)
+    sequence = FrameSequence.open(path.parent)
     cost(sequence, sequence.read_run("fine"), read_times(path.parent))
 
 
@@ -146,9 +146,9 @@ def _scene(folder: Path) -> Path:
 READERS = {
     "exr": Reader(_exr, _read_exr),
     "manifest": Reader(lambda f: small_sequence(f, (0,)).folder / "manifest.json",
-                       lambda p: Sequence.open(p.parent), "json"),
+                       lambda p: FrameSequence.open(p.parent), "json"),
     "matrices": Reader(lambda f: small_sequence(f, (0,)).folder / "frames/0000.json",
-                       lambda p: Sequence.open(p.parents[1]).read_matrices(0), "json"),
+                       lambda p: FrameSequence.open(p.parents[1]).read_matrices(0), "json"),
     "partial": Reader(_partial, _read_partial),
     "mat": Reader(_games202, read_mat),
     "import": Reader(_games202, _import),

@@ -1,6 +1,6 @@
 """Hard numbers: cases for every kernel, and how far each kernel is from float64 on them.
 
-`python tests/hard_numbers.py` prints the table; `test_hard_numbers.py` bounds it.
+`python -m tests.robustness.hard_numbers` prints the table; `test_hard_numbers.py` bounds it.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ def filled(frame: Frame) -> np.ndarray:
     return result
 
 
-# The methods in float64: what each of METHODS is by the formulas of denoise/oracles.py.
+# The methods in float64: what each of METHODS is by the formulas of denoise/oracles/.
 
 def _with_color(frame: Frame, color: np.ndarray) -> Frame:
     return Frame(frame.index, {**frame.images, "color": color}, frame.camera_from_world,

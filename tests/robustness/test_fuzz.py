@@ -1,4 +1,4 @@
-"""Damaged files at random, a few for each reader. More: `python tests/fuzz.py 20000`."""
+"""Damaged files at random, a few for each reader. More: `python -m tests.robustness.fuzz 20000`."""
 
 from __future__ import annotations
 

@@ -17,15 +17,15 @@ import pytest
 from onespp.denoise.report.html import write_report
 from onespp.denoise.run.sequence import _remove_stale
 from onespp.denoise.score.sequence import measure_sequence
-from onespp.render import job
+from onespp.render import doctor, job
 from onespp.render.errors import InputError
 from onespp.render.files import atomic, lock
 from onespp.render.files.exr import read_exr
 from onespp.render.files.lock import writing
 from onespp.render.files.manifest import Run
-from onespp.render.files.sequence import Reference, Sequence
-from onespp.render.host import backend, doctor, memory
-from onespp.render.tracer.reference import Progress
+from onespp.render.files.sequence import FrameSequence, Reference
+from onespp.render.host import backend, memory
+from onespp.render.tracer.reference import SampleSums
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 from onespp.scenes.description import SceneError
@@ -182,7 +182,7 @@ def test_commands_take_the_lock(call, scene_file, tmp_path):
         assert "another `score`" in call("score", out)[2]
         assert "another `time`" in call("time", out, "--method", "atrous")[2]
         assert call("render", scene_file, "--out", out, "--frames", "0", "--overwrite")[0] == 2
-    assert not Sequence.open(out).methods()
+    assert not FrameSequence.open(out).methods()
 
 
 def test_an_error_that_an_impatient_interrupt_turns_into_is_no_bug(call, monkeypatch):
@@ -221,7 +221,7 @@ def test_a_folder_that_is_a_link_outside_is_neither_written_nor_emptied(tmp_path
     (outside / "0000.exr").write_bytes(b"mine")
     before = contents(outside)
     assert f"{place} is a link to a place outside" in refused(take, inside, "denoise-m")
-    assert "is a link" in refused(Sequence.create, inside, small_manifest(seed=1), True)
+    assert "is a link" in refused(FrameSequence.create, inside, small_manifest(seed=1), True)
     assert contents(outside) == before
     assert not list(inside.glob(".*"))
 
@@ -246,7 +246,7 @@ def test_a_pipe_or_a_device_in_place_of_a_file_is_not_waited_for(tmp_path):
     assert "it is not a file" in refused(read_exr, frame)
     manifest.unlink()
     os.mkfifo(manifest)
-    assert "it is not a file" in refused(Sequence.open, tmp_path)
+    assert "it is not a file" in refused(FrameSequence.open, tmp_path)
 
 
 def test_names_in_a_manifest_are_no_paths(tmp_path):
@@ -339,7 +339,7 @@ def test_only_a_whole_state_of_the_same_reference_is_continued(tmp_path, change,
 
 def test_a_pass_that_an_interrupt_tore_is_not_saved():
     task = job.RenderJob(catalog.load("box"), (0,), 4, 4, reference_spp=16)
-    progress = Progress.start(4, 4)
+    progress = SampleSums.start(4, 4)
     progress.add(np.ones((4, 4, 3)), 2)
     assert job._is_after_a_pass(progress, job._sizes(task, 16))
 
@@ -403,7 +403,7 @@ def test_a_small_scene_renders_in_an_odd_environment_and_512_mb(tmp_path, scene_
     assert usage.ru_maxrss < 512 << 10
     files = os.listdir(out + b"/frames")
     assert len(files) == 6
-    assert Sequence.open(os.fsdecode(out)).manifest.frames == (0, 1, 2)
+    assert FrameSequence.open(os.fsdecode(out)).manifest.frames == (0, 1, 2)
 
 
 def test_an_empty_llvm_path_counts_as_none(tmp_path):
@@ -457,7 +457,7 @@ def test_the_time_zone_and_the_clock_do_not_matter(monkeypatch, tmp_path):
         take(tmp_path / "a", "render")
         small_sequence(tmp_path / "b")
         os.utime(tmp_path / "b/frames/0000.exr", (0, 0))  # 1970
-        assert Sequence.open(tmp_path / "b").frame_is_whole(0)
+        assert FrameSequence.open(tmp_path / "b").frame_is_whole(0)
     finally:
         monkeypatch.undo()
         time.tzset()

@@ -36,7 +36,8 @@ from .hard_numbers import (
 each_method = pytest.mark.parametrize("name", METHODS)
 each_kernel = pytest.mark.parametrize("name", EXACT)
 
-# Largest relative errors (`python tests/hard_numbers.py`), twice over. Negative radiance cancels.
+# Largest relative errors, twice over: `python -m tests.robustness.hard_numbers`. Negative radiance
+# cancels.
 BOUND = 2e-4
 BOUNDS = {"negative radiance": 2.5e-3, "65504 radiance": 6e-4, "all denormal": 1e-2}
 

@@ -233,7 +233,10 @@ def test_correspondence_stands_every_hard_scene(name):
 
 @each_scene
 def test_float32_reprojection_finds_the_place_that_float64_finds(name):
-    """At 96x64 the largest error is 1e-4 pixels; `python tests/hard_numbers.py` prints all."""
+    """At 96x64 the largest error is 1e-4 pixels.
+
+    `python -m tests.robustness.hard_numbers` prints all.
+    """
     frames, _ = rendered(name)
     errors = np.concatenate([pixel_errors(a, b) for a, b in pairwise(frames[:4])])
     assert errors.size > 50

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from onespp.render.errors import InputError
 from onespp.render.files import atomic
 from onespp.render.files.exr import read_exr, write_exr
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from tests.support.places import ROOT
 from tests.support.small_sequence import (
     HEIGHT,
@@ -90,7 +90,8 @@ def test_an_image_for_which_there_is_no_memory_is_not_called_damaged(tmp_path):
         pytest.skip("the memory of a process can be limited on Linux alone")
     path, size = tmp_path / "a.exr", 6000
     write_exr(path, {"Z": np.zeros((size, size), np.float32)})
-    code = ("import resource, sys, pathlib; from onespp.render.files.exr import read_exr, _threads; _threads(); "
+    code = ("import resource, sys, pathlib; "
+            "from onespp.render.files.exr import read_exr, _threads; _threads(); "
             "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize(); "
             f"resource.setrlimit(resource.RLIMIT_AS, (used + {2 * size * size},) * 2); "
             "read_exr(pathlib.Path(sys.argv[1]))")
@@ -255,7 +256,7 @@ def spoil_manifest(folder: Path, **changes) -> None:
 def test_a_manifest_with_a_wrong_value_names_the_key(tmp_path, changes, words):
     small_sequence(tmp_path)
     spoil_manifest(tmp_path, **changes)
-    assert words in sentence(Sequence.open, tmp_path)
+    assert words in sentence(FrameSequence.open, tmp_path)
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", "5", "{}", "[" * 100_000, "\0", "{'a': 1}",
@@ -263,13 +264,13 @@ def test_a_manifest_with_a_wrong_value_names_the_key(tmp_path, changes, words):
 def test_a_manifest_that_is_none_is_refused(tmp_path, text):
     small_sequence(tmp_path)
     (tmp_path / "manifest.json").write_text(text)
-    assert "manifest.json" in sentence(Sequence.open, tmp_path)
+    assert "manifest.json" in sentence(FrameSequence.open, tmp_path)
 
 
 def test_a_manifest_that_is_not_text_is_refused(tmp_path):
     small_sequence(tmp_path)
     (tmp_path / "manifest.json").write_bytes(b"\xff\xfe\x80")
-    assert "not valid JSON" in sentence(Sequence.open, tmp_path)
+    assert "not valid JSON" in sentence(FrameSequence.open, tmp_path)
 
 
 @pytest.mark.parametrize(("changes", "words"), [
@@ -281,15 +282,15 @@ def test_a_manifest_that_is_not_text_is_refused(tmp_path):
 def test_a_manifest_that_disagrees_with_its_frames_is_noticed(tmp_path, changes, words):
     small_sequence(tmp_path)
     spoil_manifest(tmp_path, **changes)
-    assert words in sentence(Sequence.open(tmp_path).read_frame, 0)
+    assert words in sentence(FrameSequence.open(tmp_path).read_frame, 0)
 
 
 def test_a_frame_of_the_manifest_that_is_not_there_is_named(tmp_path):
     small_sequence(tmp_path)
     spoil_manifest(tmp_path, frames="0:5")
-    assert "0004.json does not exist" in sentence(Sequence.open(tmp_path).read_frame, 4)
+    assert "0004.json does not exist" in sentence(FrameSequence.open(tmp_path).read_frame, 4)
     (tmp_path / "frames/0000.exr").unlink()
-    assert "0000.exr does not exist" in sentence(Sequence.open(tmp_path).read_frame, 0)
+    assert "0000.exr does not exist" in sentence(FrameSequence.open(tmp_path).read_frame, 0)
 
 
 def test_frames_that_were_mixed_up_are_noticed(tmp_path):
@@ -331,7 +332,7 @@ def test_changed_json_is_read_or_ends_in_one_sentence(tmp_path_factory, place, n
         data = path.read_bytes()
         at = place % len(data)
         path.write_bytes(data[:at] + new + data[at + removed:])
-        for result in (outcome(Sequence.open, folder), outcome(sequence.read_matrices, 0)):
+        for result in (outcome(FrameSequence.open, folder), outcome(sequence.read_matrices, 0)):
             assert not isinstance(result, str) or result.isprintable()
         path.write_bytes(data)
 
@@ -391,7 +392,7 @@ def test_a_full_disk_ends_in_one_sentence_and_loses_nothing(tmp_path, monkeypatc
     assert "disk is full" in sentence(sequence.write_frame, small_frame(0, seed=1))
     assert "disk is full" in sentence(sequence.write_result, "m", 0, small_frame()["color"])
     assert "disk is full" in sentence(
-        Sequence.create, tmp_path, small_manifest(frames=(0, 1, 2, 3)))
+        FrameSequence.create, tmp_path, small_manifest(frames=(0, 1, 2, 3)))
     monkeypatch.undo()
     assert contents(tmp_path) == before
 
@@ -400,11 +401,12 @@ def test_a_full_disk_ends_in_one_sentence_and_loses_nothing(tmp_path, monkeypatc
 def test_a_real_limit_on_file_size_is_a_full_disk_too(tmp_path):
     sequence = small_sequence(tmp_path)
     before = contents(tmp_path)
-    code = ("import resource, signal, sys; sys.path.insert(0, 'tests'); import numpy as np; "
-            "from onespp.render.files.sequence import Sequence; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
+    code = ("import resource, signal, sys; import numpy as np; "
+            "from onespp.render.files.sequence import FrameSequence; "
+            "signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
             "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000)); "
-            "from small_sequence import small_frame; "
-            "Sequence.open(sys.argv[1]).write_result('m', 0, small_frame()['color'])")
+            "from tests.support.small_sequence import small_frame; "
+            "FrameSequence.open(sys.argv[1]).write_result('m', 0, small_frame()['color'])")
     run = subprocess.run([sys.executable, "-c", code, str(sequence.folder)], capture_output=True,
                          text=True, cwd=ROOT)
     assert "InputError" in run.stderr
@@ -434,7 +436,7 @@ def test_a_killed_writer_leaves_nothing_that_counts(tmp_path):
     left.write_bytes(b"half")
     assert atomic.is_temporary(left)
     assert left.suffix == ".exr"  # programs that go by the name can write to it
-    grown = Sequence.create(tmp_path, small_manifest(frames=(0, 1)))
+    grown = FrameSequence.create(tmp_path, small_manifest(frames=(0, 1)))
     assert not grown.has_frame(1)
     assert sequence.has_frame(0)
 

@@ -1,7 +1,7 @@
 """Commands stopped at random moments: what was finished is whole, the same command completes it.
 
-The few kills of the usual suite have larger sisters, `pytest -m slow tests/test_kill.py`: 50
-moments for each command.
+The few kills of the usual suite have larger sisters, 50 moments for each command:
+`pytest -m slow tests/robustness/test_kill.py`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ from .fuzz import SCENE
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
 
 # Partial references are saved after every pass here, so that kills meet them.
-PROGRAM = "import onespp.render.job; onespp.render.job.SECONDS_BETWEEN_SAVES = 0; import onespp.cli; onespp.cli.main()"
+PROGRAM = ("import onespp.cli, onespp.render.job; "
+           "onespp.render.job.SECONDS_BETWEEN_SAVES = 0; onespp.cli.main()")
 COMMANDS = {
     "render": ("render", "{scene}", "--frames", "0:8", "--size", "64x48", "--reference-spp", "16",
                "--out", "{out}"),

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from onespp.render.errors import InputError
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.job import RenderJob, render_sequence
 from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Camera, Mesh
@@ -127,7 +127,7 @@ def test_frames_after_the_last_are_not_mixed_with_those_of_another_motion(tmp_pa
 
     render(rolling(20), 0, 8, 9)
     render(rolling(20), 1, 12)
-    assert Sequence.open(tmp_path / "s").frames == [0, 1, 8, 9, 12]
+    assert FrameSequence.open(tmp_path / "s").frames == [0, 1, 8, 9, 12]
     render(rolling(12), 2, 10)  # as far as the folder's frames go, the same
     before = (tmp_path / "s/manifest.json").read_bytes()
     for frames in ([8], [13], [3]):
@@ -135,12 +135,12 @@ def test_frames_after_the_last_are_not_mixed_with_those_of_another_motion(tmp_pa
             render(rolling(9), *frames)
     assert (tmp_path / "s/manifest.json").read_bytes() == before
     render_sequence(RenderJob(rolling(9), [8], SIZE, SIZE), tmp_path / "s", overwrite=True)
-    assert Sequence.open(tmp_path / "s").frames == [8]
+    assert FrameSequence.open(tmp_path / "s").frames == [8]
 
 
 def test_frames_after_the_last_that_were_asked_for_but_not_made_bind_nobody(tmp_path):
     job = RenderJob(rolling(20), (0, 9), SIZE, SIZE)
-    Sequence.create(tmp_path / "s", job.manifest())
+    FrameSequence.create(tmp_path / "s", job.manifest())
     render_sequence(RenderJob(rolling(8), (0, 9), SIZE, SIZE), tmp_path / "s")
     with pytest.raises(InputError, match="frame 9"):
         render_sequence(job, tmp_path / "s")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from onespp.render.errors import InputError
-from onespp.render.mitsuba.scene import Stage
+from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import meshes
 from onespp.scenes.description import (
@@ -91,7 +91,7 @@ def test_a_name_that_cannot_be_written_is_refused(name):
     (bare(reflectance={"type": "mesh_attribute", "name": "vertex_color"}), ["mesh_attribute"]),
 ])
 def test_what_mitsuba_does_not_take_is_named(material, words):
-    refused(lambda: Stage(scene(material)), *words)
+    refused(lambda: MitsubaScene(scene(material)), *words)
 
 
 @pytest.mark.parametrize(("material", "words"), [
@@ -156,12 +156,12 @@ def test_materials_that_killed_the_process_are_refused():
     """In one child for all of them: it goes on after each, and ends well."""
     program = textwrap.dedent("""
         import numpy as np
-        from test_scene_mistakes import Stage, scene
+        from test_scene_mistakes import MitsubaScene, scene
         from onespp.scenes.description import SceneError
         from onespp.scenes.materials import diffuse
         for material in ({materials}):
             try:
-                Stage(scene(material))
+                MitsubaScene(scene(material))
             except SceneError as error:
                 print("SAID", error)
     """).format(materials=", ".join(m if isinstance(m, str) else repr(m) for m in DEADLY.values()))
@@ -233,7 +233,7 @@ def test_emission_is_the_same_in_any_form(emission):
     ({"type": "point"}, ["'point'"]), ({"type": "blackbody", "temperature": 5e3}, ["spectral"]),
     (checks((0, 0, 0), (5, 5, 5)), ["color1", "5"])])
 def test_emission_that_cannot_be_is_refused(emission, words):
-    refused(lambda: Stage(scene(emission=emission)), "emission of", "'x'", *words)
+    refused(lambda: MitsubaScene(scene(emission=emission)), "emission of", "'x'", *words)
 
 
 @pytest.mark.parametrize("geometry", [Rectangle(), Disk(), Sphere(), Cylinder()],
@@ -251,7 +251,8 @@ def test_an_image_that_glows_lights_as_its_colour_does(geometry):
 
 def test_an_image_that_glows_on_a_mesh_is_refused():
     """Six sides of a box share their uv, and five would not be found: 30 % too dark."""
-    refused(lambda: Stage(scene(geometry=meshes.box((1, 1, 1)), emission=np.ones((4, 4, 3)))),
+    refused(lambda: MitsubaScene(scene(geometry=meshes.box((1, 1, 1)),
+                                       emission=np.ones((4, 4, 3)))),
             "'x'", "mesh", "Rectangle")
 
 
@@ -277,7 +278,8 @@ def test_environment_image_of_any_size_and_file(size, tmp_path):
     (np.ones((0, 4, 3)), ["pixels"]), (-np.ones((4, 8, 3)), ["-1"]), (lambda frame: 1, ["number"]),
     (np.full((4, 8, 3), np.nan), ["not finite"]), ({"type": "sunsky"}, ["sunsky"]), (-1, ["-1"])])
 def test_environment_that_cannot_be_is_refused(environment, words):
-    refused(lambda: Stage(scene(environment=environment)), "environment of scene 't'", *words)
+    refused(lambda: MitsubaScene(scene(environment=environment)),
+            "environment of scene 't'", *words)
 
 
 def test_values_in_image_files_are_checked_too(tmp_path):
@@ -286,10 +288,11 @@ def test_values_in_image_files_are_checked_too(tmp_path):
     for name, value in (("bright", 2.0), ("negative", -1.0), ("nan", np.nan)):
         path = tmp_path / f"{name}.exr"
         mi.Bitmap(np.full((4, 8, 3), value, np.float32)).write(str(path))
-        refused(lambda path=path: Stage(scene(bare(
+        refused(lambda path=path: MitsubaScene(scene(bare(
             reflectance={"type": "bitmap", "filename": str(path)}))), "'x'", path.name)
         if name != "bright":
-            refused(lambda path=path: Stage(scene(environment=path)), "environment", path.name)
+            refused(lambda path=path: MitsubaScene(scene(environment=path)),
+                    "environment", path.name)
 
 
 # Geometry, sizes, cameras
@@ -353,7 +356,7 @@ def test_a_sheared_sphere_or_tube_is_refused(geometry):
     shear[:3, 1] = np.array([0.7, 1, 0]) / np.hypot(0.7, 1)
     made = Scene("t", "t", (Shape("x", geometry, GRAY, shear),), Camera(EYE), 2, 8, 6,
                  environment=1)
-    refused(lambda: Stage(made), "'x'", "shears")
+    refused(lambda: MitsubaScene(made), "'x'", "shears")
 
 
 def test_a_camera_with_rounded_numbers_is_taken():

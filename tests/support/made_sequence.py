@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from onespp.render.files.manifest import Manifest, Run
-from onespp.render.files.sequence import Reference, Sequence
+from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.frame import Frame
 
 HEIGHT, WIDTH, COUNT, SPP = 21, 33, 4, 256
@@ -22,9 +22,9 @@ def truth(i: int) -> np.ndarray:
     return image
 
 
-def make_sequence(folder: Path, reference: bool = True, methods: bool = True) -> Sequence:
+def make_sequence(folder: Path, reference: bool = True, methods: bool = True) -> FrameSequence:
     rng = np.random.default_rng(1)
-    sequence = Sequence.create(folder, Manifest(
+    sequence = FrameSequence.create(folder, Manifest(
         scene="made", frames=tuple(range(COUNT)), width=WIDTH, height=HEIGHT, fps=12.0, seed=7,
         reference_spp=SPP if reference else None, channels=("color",), objects=("all",),
         versions={"maker": "1.0"}))
@@ -42,7 +42,7 @@ def make_sequence(folder: Path, reference: bool = True, methods: bool = True) ->
     return sequence
 
 
-def write_method(sequence: Sequence, name: str, sigma: float, ms: float) -> None:
+def write_method(sequence: FrameSequence, name: str, sigma: float, ms: float) -> None:
     """Results with relative noise `sigma`; the first frame takes ten times as long."""
     rng = np.random.default_rng(2)
     for i in sequence.frames:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from onespp.render.files.manifest import Manifest, Run
-from onespp.render.files.sequence import Reference, Sequence
+from onespp.render.files.sequence import FrameSequence, Reference
 
 from .frames import make_frame, noisy, translation
 
@@ -16,8 +16,8 @@ CHANNELS = ("color", "albedo", "normal", "position", "depth", "id")
 METHODS = {"rough": (0.3, 2.0), "fine": (0.05, 40.0)}  # name: relative noise, ms
 
 
-def make_report_sequence(folder: Path, frames: int = COUNT, **settings) -> Sequence:
-    sequence = Sequence.create(folder, Manifest(**{
+def make_report_sequence(folder: Path, frames: int = COUNT, **settings) -> FrameSequence:
+    sequence = FrameSequence.create(folder, Manifest(**{
         "scene": "made", "about": "A board before a wall", "frames": tuple(range(frames)),
         "width": WIDTH, "height": HEIGHT, "fps": 12.0, "seed": 7, "reference_spp": SPP,
         "channels": CHANNELS, "objects": ("wall", "board"), "versions": {"maker": "1.0"},

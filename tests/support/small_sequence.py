@@ -9,7 +9,7 @@ import numpy as np
 
 from onespp.render.channels import CHANNELS, FRAME
 from onespp.render.files.manifest import Manifest
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.frame import Frame
 
 HEIGHT, WIDTH = 21, 9  # two blocks of rows in a file
@@ -34,8 +34,8 @@ def small_manifest(**changes: Any) -> Manifest:
     return Manifest(**{**values, **changes})
 
 
-def small_sequence(folder: Path, frames: tuple[int, ...] = (0, 1)) -> Sequence:
-    sequence = Sequence.create(folder, small_manifest(frames=frames))
+def small_sequence(folder: Path, frames: tuple[int, ...] = (0, 1)) -> FrameSequence:
+    sequence = FrameSequence.create(folder, small_manifest(frames=frames))
     for i in frames:
         sequence.write_frame(small_frame(i), {"scene": "small"})
     return sequence

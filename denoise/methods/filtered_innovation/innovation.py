@@ -96,7 +96,7 @@ class Innovations(NamedTuple):
     footprint_falloff: Float | None
 
 
-def innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signal],
+def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signal],
                 surface: SurfaceSample, plane: TangentPlane, motion: Motion, records: Float,
                 shadows: Shadows | None, tests: ReprojectionTests, max_history_length: Float,
                 falloff_scale: Float) -> Innovations:
@@ -127,16 +127,16 @@ def innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signal],
                        footprint_falloff(shadows.penumbra, falloff_scale, MIN_SHARE))
 
 
-def to_smooth(layout: SignalLayout, found: Innovations) -> Smoothed:
+def to_smooth(layout: SignalLayout, innovations: Innovations) -> Smoothed:
     """What is smoothed of the innovation."""
     has_visibility = SignalKind.VISIBILITY in layout.kinds
-    diffuse, *sharp = found.signals
+    diffuse, *sharp = innovations.signals
     return Smoothed(
-        diffuse_spread=found.energies[0], diffuse=diffuse,
-        excess=found.shadow.excess if found.shadow else None,
-        visibility_spread=found.energies[-1] if has_visibility else None, sharp=sharp,
-        shadow_innovation=found.shadow.innovation if found.shadow else None,
-        energies=found.energies)
+        diffuse_spread=innovations.energies[0], diffuse=diffuse,
+        excess=innovations.shadow.excess if innovations.shadow else None,
+        visibility_spread=innovations.energies[-1] if has_visibility else None, sharp=sharp,
+        shadow_innovation=innovations.shadow.innovation if innovations.shadow else None,
+        energies=innovations.energies)
 
 
 def pack_history(stencil: Stencil, layout: SignalLayout, surface: SurfaceSample,

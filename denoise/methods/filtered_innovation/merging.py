@@ -1,5 +1,6 @@
 """A signal and its history merged by the filtered innovation."""
 
+# pyright: standard
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -45,17 +46,17 @@ class Merged(NamedTuple):
     fade: Float
 
 
-def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], found: Innovations,
+def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovations: Innovations,
           smoothed: Smoothed, plane: TangentPlane, gains: Gains) -> Merged:
     """The new history, and how the last filter fades out with it."""
-    if found.shadow is not None:
-        found, smoothed = _choose_history(found, found.shadow, smoothed)
-    is_new = found.length < 1.5
+    if innovations.shadow is not None:
+        innovations, smoothed = _choose_history(innovations, innovations.shadow, smoothed)
+    is_new = innovations.length < 1.5
     spatial = spatial_variances(stencil, signals, is_new, plane)
     merged = []
     for s, (kind, signal) in enumerate(zip(layout.kinds, signals, strict=True)):
-        e, wide = found.signals[s], [smoothed.diffuse, *smoothed.sharp][s]
-        a, gain = dr.maximum(1 / found.length, gains.alphas[s]), gains.sharp_min_gain
+        e, wide = innovations.signals[s], [smoothed.diffuse, *smoothed.sharp][s]
+        a, gain = dr.maximum(1 / innovations.length, gains.alphas[s]), gains.sharp_min_gain
         if kind is SignalKind.DIFFUSE:
             gain = dr.maximum(_certainty(smoothed.diffuse_spread, wide, gains), gains.min_gain)
         elif kind is SignalKind.VISIBILITY:
@@ -65,11 +66,11 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], found: 
             gain = dr.maximum(certain, gains.sharp_min_gain)
         gain = dr.maximum(gain, a)
         merged_signal = mapped(_merged(gain, a), signal, e, wide)
-        energy, variance = smoothed.energies[s], found.variances[s]
+        energy, variance = smoothed.energies[s], innovations.variances[s]
         noise = dr.select(is_new, spatial[s], dr.maximum(energy - variance, energy * MIN_NOISE))
         merged.append(NoisySignal(merged_signal, dr.fma(dr.square(1 - a), variance,
                                                         dr.square(a) * noise)))
-    return Merged(merged, fade_out(found.length, gains.fade_frames))
+    return Merged(merged, fade_out(innovations.length, gains.fade_frames))
 
 
 def _merged(gain: Float, a: Float) -> Callable[[Float, Float, Float], Float]:
@@ -77,20 +78,20 @@ def _merged(gain: Float, a: Float) -> Callable[[Float, Float, Float], Float]:
     return lambda d, e, wide: dr.fma(gain - a, wide, dr.fma(a - 1, e, d))
 
 
-def _choose_history(found: Innovations, shadow: ShadowInnovation,
+def _choose_history(innovations: Innovations, shadow: ShadowInnovation,
                     smoothed: Smoothed) -> tuple[Innovations, Smoothed]:
     """With the shadow history of visibility in the place of the other one, where it is better."""
     excess, energy, shadow_wide = smoothed.excess, smoothed.energies[-1], smoothed.shadow_innovation
     assert excess is not None
     assert shadow_wide is not None
     better = excess < 0
-    e, wide = found.signals[-1], smoothed.sharp[-1]
+    e, wide = innovations.signals[-1], smoothed.sharp[-1]
     e = e._replace(luminance=dr.select(better, shadow.innovation, e.luminance))
     wide = wide._replace(luminance=dr.select(better, shadow_wide, wide.luminance))
-    variance = dr.select(better, shadow.variance, found.variances[-1])
+    variance = dr.select(better, shadow.variance, innovations.variances[-1])
     energy = dr.maximum(energy + dr.minimum(excess, 0), 0)
-    return (found._replace(signals=[*found.signals[:-1], e],
-                           variances=[*found.variances[:-1], variance]),
+    return (innovations._replace(signals=[*innovations.signals[:-1], e],
+                           variances=[*innovations.variances[:-1], variance]),
             smoothed._replace(sharp=[*smoothed.sharp[:-1], wide],
                               energies=[*smoothed.energies[:-1], energy]))
 

@@ -1,11 +1,13 @@
 """Our method, `onespp`: signals apart, each with a history that follows changes of light.
 
-A frame's light is split into what has noise of its own kind (`signals.py`): the visibility of
-lights, what glossy lobes reflect, and the rest, all without texture. Each signal is merged with
-its history by the filtered innovation and then filtered once more, to be looked at, not to be kept
-(`innovation.py`). All signals go through one pass a level, so that geometry is weighed once.
+A frame's light is split into signals that have noise of their own kind (`inputs/signals.py`): the
+visibility of lights, what glossy lobes reflect, and the rest, demodulated. The innovation of a
+signal is the frame's value minus its reprojected history. Smoothed widely over the surface it says
+how the light has changed, with little noise: history takes a share of it, the gain, and alpha of
+what is left (`merging.py`). A last filter is for the eye alone and is not fed back (`output.py`).
+All signals go through one pass a level, so that geometry is weighed once.
 
-Parameters were found by measurement: see `tune.py`.
+Parameters were found by measurement: see `studies/tune.py`.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from typing import ClassVar
 
 import drjit as dr
 
+from onespp.denoise.filters.atrous import BACKGROUND, LARGEST_LEVELS
 from onespp.denoise.history.records import RecordState, no_history
 from onespp.denoise.history.reprojection import ReprojectionTests, motion_between, without_images
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
@@ -24,9 +27,9 @@ from onespp.denoise.inputs.shadow_rays import has_shadow_rays, read_shadow_rays
 from onespp.denoise.inputs.signals import USED, SignalKind, read_signals
 from onespp.denoise.inputs.surface import Surface, TangentPlane
 from onespp.denoise.jit.arrays import Bool, Color, Float
+from onespp.denoise.jit.fastmath import LOG2E
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import evaluate
-from onespp.denoise.methods.atrous import BACKGROUND, LARGEST_LEVELS, LOG2E
 from onespp.denoise.methods.base import OnLanes
 from onespp.denoise.methods.parameters import (
     INNOVATION_RENAMED,
@@ -41,8 +44,8 @@ from .layout import ENERGY_LEVELS, History, SignalLayout
 from .merging import Gains
 from .passes import Passes
 
-_BLACK = 2 * BACKGROUND   # 1/z of a surface that reflects nothing: a lamp
-_BACKGROUND_SCALE = 1e3   # |k| / sigma_plane of background and lamps, whose like alone count
+_LAMP = 2 * BACKGROUND    # 1/z where albedo is 0: far from any plane, and from background
+_BACKGROUND_SCALE = 1e3   # |k| / sigma_plane of background and lamps: only their like counts
 
 
 @dataclass(frozen=True)
@@ -50,27 +53,45 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     """The filtered innovation of visibility, glossy and diffuse light.
 
     Attributes:
-        light_alpha, visibility_alpha: least weight of the current frame in high frequencies.
-        min_gain: least share of the smoothed innovation that diffuse light takes, above 0 to 1;
-            all of it where frames have no visibility.
-        noise_threshold: how many variances of it count as noise.
-        sharp_min_gain: least share of it that visibility and glossy light take.
-        change_alpha: weight of the current frame in visibility's high frequencies where the change
-            of the low ones is certain.
-        innovation_levels, output_levels: of diffuse light, levels of the innovation's smoothing,
-            and of the last filter while there is no history; the last of these fades out over
-            `fade_frames` frames.
-        sharp_innovation_levels, sharp_output_levels: the same of visibility and of glossy light.
-        light_sigma, visibility_sigma: of luminance in the last filter, standard deviations.
-        sigma_plane: distance from the tangent plane over depth.
-        max_history_length: frames.
-        min_cosine, plane_tolerance: tests of history, see `reprojection.py`.
-        demodulate: filter diffuse light without texture, where frames have albedo.
+        light_alpha: least weight of the current frame in the high frequencies of diffuse and
+            glossy light [1, 1e-6 to 1].
+        visibility_alpha: the same of visibility [1, 1e-6 to 1].
+        min_gain: least share of the smoothed innovation that the history of diffuse light takes;
+            all of it where frames have no visibility [1, 1e-6 to 1].
+        noise_threshold: a smoothed innovation whose square is below this many of its variances
+            is taken for noise [variances, 0 to 1e6].
+        sharp_min_gain: as `min_gain`, of visibility and glossy light [1, 1e-6 to 1].
+        change_alpha: weight of the current frame in the high frequencies of visibility where a
+            change of the low ones is certain [1, 0 to 1].
+        innovation_levels: levels of the innovation's smoothing, of diffuse light [1, 2 to 8].
+        output_levels: levels of the last filter of diffuse light while there is no history; the
+            last of them fades out over `fade_frames` [1, 1 to 8].
+        sharp_innovation_levels: as `innovation_levels`, of visibility and glossy light, and no
+            more than those [1, 2 to 8].
+        sharp_output_levels: as `output_levels`, of visibility and glossy light, and no more than
+            those [1, 1 to 8].
+        light_sigma: falloff of the last filter with difference of luminance, of diffuse and
+            glossy light [standard deviations, above 0].
+        visibility_sigma: the same of visibility [standard deviations, above 0].
+        fade_frames: history length at which the last level has faded out [frames, above 0].
+        sigma_plane: falloff with distance from the tangent plane [share of depth, above 0].
+        max_history_length: cap of the history length [frames, 1 to 1e6].
+        min_cosine: least cosine between a history tap's normal and the expected one, see
+            `reprojection.py` [1, -1 to 1].
+        plane_tolerance: largest distance of a history tap from the expected tangent plane
+            [share of depth, above 0].
+        demodulate: filter diffuse light over albedo, where frames have albedo.
         gloss: glossy light as a signal of its own, where frames have it.
-        penumbra: reach of the smoothing of visibility, and of its last filter: a level's standard
-            deviation in widths of the penumbra.
-        follow_shadows: visibility's history where the shadow was, and `penumbra`; where frames
-            have shadow rays.
+        penumbra: standard deviation of a level of visibility's filters, at most
+            [widths of the penumbra, above 0].
+        follow_shadows: a second history of visibility where the shadow was, and `penumbra`;
+            where frames have shadow rays.
+
+    Example, with `frame` a `Frame` of 12x16 pixels:
+        >>> method = FilteredInnovation(light_alpha=0.1)
+        >>> image, state = method(frame, method.init(12, 16))
+        >>> image.shape, image.dtype
+        ((12, 16, 3), dtype('float32'))
     """
 
     light_alpha: float = 0.05
@@ -124,7 +145,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         stencil, previous, sample = state.stencil, state.previous or frame, surface.sample
         motion = motion_between(previous, frame, stencil)
         light = read_signals(frame, color, stencil, self.demodulate, self.gloss)
-        signals, plane = light.listed, self._tangent_plane(surface, light.texture.black, stencil)
+        signals = light.listed
+        plane = self._tangent_plane(surface, light.texture.zero_albedo, stencil)
         rays = None
         if self.follow_shadows and light.unshadowed and has_shadow_rays(frame):
             rays = read_shadow_rays(frame, previous, stencil)
@@ -136,12 +158,13 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
 
         passes.store_surface(id_, plane)
         shadows = passes.spread_shadows(rays, sample, surface.position, plane)
-        found = passes.innovations(signals, sample, plane, motion, state.records, shadows,
-                                   *self._limits(stencil))
-        smoothed = passes.smooth_innovations(found, plane)
-        merged = passes.merge(signals, found, smoothed, plane, self._gains(stencil, layout))
-        output = passes.filter_output(merged, found, plane, self._sigmas(stencil, layout))
-        records = passes.pack(sample, History(found.length, merged.signals))
+        innovations = passes.find_innovations(
+            signals, sample, plane, motion, state.records, shadows,
+            *self._reprojection_parameters(stencil))
+        smoothed = passes.smooth_innovations(innovations, plane)
+        merged = passes.merge(signals, innovations, smoothed, plane, self._gains(stencil, layout))
+        output = passes.filter_output(merged, innovations, plane, self._sigmas(stencil, layout))
+        records = passes.pack(sample, History(innovations.length, merged.signals))
         return light.color(output), replace(state, passes=passes, records=records,
                                             previous=without_images(frame))
 
@@ -150,20 +173,21 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
                             self.sharp_innovation_levels, self.output_levels,
                             self.sharp_output_levels)
 
-    def _tangent_plane(self, surface: Surface, black: Bool | None,
+    def _tangent_plane(self, surface: Surface, zero_albedo: Bool | None,
                        stencil: Stencil) -> TangentPlane:
-        """Of each pixel; lamps, which are black, and background are far away."""
+        """Tangent planes in 1/z. Where there is none (background, lamps) 1/z is far from any other
+        and the scale so large that such pixels blend with their like alone."""
         is_valid = surface.is_valid
         inverse_depth = dr.select(is_valid, surface.inverse_depth, stencil.Float(BACKGROUND))
         scale = dr.abs(surface.plane_distance) * stencil.opaque(1 / self.sigma_plane)
-        if black is not None:
-            inverse_depth = dr.select(is_valid & black, _BLACK, inverse_depth)
-            is_valid &= ~black
+        if zero_albedo is not None:
+            inverse_depth = dr.select(is_valid & zero_albedo, _LAMP, inverse_depth)
+            is_valid &= ~zero_albedo
         scale = dr.select(is_valid, scale, stencil.Float(_BACKGROUND_SCALE))
         dx, dy = (dr.select(is_valid, slope, 0) for slope in surface.slope)
         return TangentPlane(inverse_depth, dx, dy, scale)
 
-    def _limits(self, stencil: Stencil) -> tuple[ReprojectionTests, Float, Float]:
+    def _reprojection_parameters(self, stencil: Stencil) -> tuple[ReprojectionTests, Float, Float]:
         """Tests of history, its length, and the scale of `penumbra.footprint_falloff`."""
         tests = ReprojectionTests(stencil.opaque(self.min_cosine),
                                   stencil.opaque(self.plane_tolerance))
@@ -182,6 +206,3 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         """As the exponents of the last filter want them."""
         return [stencil.opaque(math.sqrt(LOG2E) / sigma)
                 for sigma in layout.each(self.light_sigma, self.visibility_sigma)]
-
-
-_ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH = range(3)  # planes of the surface

@@ -1,5 +1,6 @@
 """The noise of a signal without history, from one frame."""
 
+# pyright: standard
 from __future__ import annotations
 
 from itertools import product

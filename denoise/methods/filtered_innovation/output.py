@@ -1,5 +1,6 @@
 """The last filter, whose result is looked at and not kept."""
 
+# pyright: standard
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -7,6 +8,7 @@ from typing import NamedTuple
 
 import drjit as dr
 
+from onespp.denoise.filters.atrous import EPSILON
 from onespp.denoise.filters.tangent_plane import BINOMIAL, SurfaceTap, surface_exponent
 from onespp.denoise.inputs.signals import SignalKind
 from onespp.denoise.inputs.surface import TangentPlane
@@ -14,7 +16,6 @@ from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.fastmath import exp2
 from onespp.denoise.jit.structure import mapped
 from onespp.denoise.jit.taps import Taps, window
-from onespp.denoise.methods.atrous import EPSILON
 
 from .layout import NoisySignal, SignalLayout
 from .smoothing import footprint

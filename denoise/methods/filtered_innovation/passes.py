@@ -17,15 +17,15 @@ from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import arrays_of, build, flatten
 from onespp.denoise.jit.taps import Taps, window
 
-from .innovation import Innovations, innovations, pack_history, to_smooth
+from .innovation import Innovations, find_innovations, pack_history, to_smooth
 from .layout import PlaneRule, SignalLayout, Smoothed
 from .merging import Merged, merge
-from .method import _ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH
 from .output import OutputFalloff, output_level
 from .shadows import Shadows, follow_shadows
 from .smoothing import smooth_level
 
 _OUTSIDE = -1e15          # 1/z outside the image
+_ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH = range(3)  # planes of the surface
 _SHADOW_PLANES = 5        # of `Shadows`
 T = TypeVar("T")
 
@@ -59,7 +59,7 @@ class Passes:
 
     Attributes:
         surfaces: planes of object ID, 1/z, and 1/z of what has a history.
-        buffer: planes of what is being smoothed or filtered, see `signal_layout.py`.
+        buffer: planes of what is being smoothed or filtered, see `layout.py`.
     """
 
     stencil: Stencil
@@ -68,7 +68,7 @@ class Passes:
     buffer: Planes
     follow_shadows: Step[..., Shadows]
     spread: Level
-    innovations: Step[..., Innovations]
+    find_innovations: Step[..., Innovations]
     smoothing: list[Level]
     merge: Step[..., Merged]
     output: list[Level]
@@ -94,7 +94,7 @@ class Passes:
             stencil, layout, surfaces, buffer, Step(lambda *a: follow_shadows(stencil, *a)),
             Level.make(SPREAD_LEVEL, buffer, _SHADOW_PLANES, surfaces, _INVERSE_DEPTH,
                        lambda *a: smooth_level(spread, *a)),
-            Step(lambda *a: innovations(stencil, layout, *a)),
+            Step(lambda *a: find_innovations(stencil, layout, *a)),
             [smoothing(i) for i in range(layout.innovation_levels)],
             Step(lambda *a: merge(stencil, layout, *a)),
             [output(i) for i in range(layout.output_levels)],
@@ -110,16 +110,16 @@ class Passes:
             return None
         return self._through([self.spread], self.follow_shadows(rays, surface, position), plane)
 
-    def smooth_innovations(self, found: Innovations, plane: TangentPlane) -> Smoothed:
+    def smooth_innovations(self, innovations: Innovations, plane: TangentPlane) -> Smoothed:
         """Q, S and W of the innovation, over pixels that have a history."""
-        self.surfaces.store(found.valid_inverse_depth, first=_VALID_INVERSE_DEPTH)
-        return self._through(self.smoothing, to_smooth(self.layout, found), plane,
-                             found.footprint_falloff)
+        self.surfaces.store(innovations.valid_inverse_depth, first=_VALID_INVERSE_DEPTH)
+        return self._through(self.smoothing, to_smooth(self.layout, innovations), plane,
+                             innovations.footprint_falloff)
 
-    def filter_output(self, merged: Merged, found: Innovations, plane: TangentPlane,
+    def filter_output(self, merged: Merged, innovations: Innovations, plane: TangentPlane,
                       sigmas: list[Float]) -> list[Signal]:
         """The last filter of each signal."""
-        falloff = OutputFalloff(merged.fade, found.footprint_falloff)
+        falloff = OutputFalloff(merged.fade, innovations.footprint_falloff)
         filtered = self._through(self.output, merged.signals, plane, falloff, sigmas)
         return [noisy.signal for noisy in filtered]
 
@@ -132,3 +132,5 @@ class Passes:
             planes[:level.count] = level.step(level.values, level.surfaces, plane, level.spacing,
                                               *arguments)
         return build(form, planes)
+
+

@@ -1,5 +1,6 @@
 """What shadow rays say of each pixel: how its shadow moves, and how soft it is."""
 
+# pyright: standard
 from __future__ import annotations
 
 from typing import NamedTuple

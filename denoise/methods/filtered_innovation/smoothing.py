@@ -1,5 +1,6 @@
 """The wide smoothing of the innovation, over the surface by geometry alone."""
 
+# pyright: standard
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

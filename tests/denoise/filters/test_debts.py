@@ -8,10 +8,10 @@ import pytest
 from onespp.denoise.catalog import build
 from onespp.denoise.filters.debts import repay
 from onespp.denoise.methods import base as lanes
+from onespp.denoise.oracles.filtered_innovation import repaid
 from onespp.render.frame import Frame
 from tests.denoise.methods.test_methods import SMALL, each_method
 from tests.support.frames import make_frame, noisy, with_images
-from tests.support.innovation_oracle import repaid
 
 
 def indebted(height=19, width=23, share=0.2, seed=0):

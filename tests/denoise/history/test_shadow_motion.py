@@ -12,6 +12,7 @@ from onespp.denoise.inputs.shadow_rays import read_shadow_rays
 from onespp.denoise.inputs.surface import read_surface
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
+from onespp.denoise.oracles import filtered_innovation as innovation_oracle
 from onespp.render.channels import FRAME, SHADOW, SPLIT
 from onespp.render.errors import InputError
 from onespp.render.tracer.renderer import Renderer
@@ -19,7 +20,6 @@ from onespp.scenes.description import Camera, Rectangle, Shape, Sphere
 from onespp.scenes.transforms import look_at, rotate, scale, translate
 from tests.denoise.methods.test_filtered_innovation import run, split
 from tests.render.tracer.test_renderer import gray, small_scene
-from tests.support import innovation_oracle
 from tests.support.frames import translation
 
 HEIGHT, WIDTH = 48, 64

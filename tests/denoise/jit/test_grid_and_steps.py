@@ -435,10 +435,10 @@ def test_impossible_grids_are_refused(size, layout, words):
 
 COLLECTED_WHILE_RECORDING = """
 import gc
-import denoise
+import onespp.denoise
 import drjit.llvm as llvm
 import numpy as np
-from onespp.denoise.jit.grid import Step
+from onespp.denoise.jit.step import Step
 
 class Cycle:
     pass

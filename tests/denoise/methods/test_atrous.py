@@ -2,8 +2,9 @@ import drjit as dr
 import numpy as np
 import pytest
 
+from onespp.denoise.filters.atrous import estimate_variance
 from onespp.denoise.jit.grid import Stencil
-from onespp.denoise.methods.atrous import Atrous, estimate_variance
+from onespp.denoise.methods.atrous import Atrous
 from onespp.denoise.oracles import filters as oracles
 from onespp.render.errors import InputError
 from tests.support.frames import make_frame, noisy, with_images

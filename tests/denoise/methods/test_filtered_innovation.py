@@ -12,8 +12,8 @@ from onespp.denoise.inputs.signals import USED, read_signals
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.methods import base as lanes
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
+from onespp.denoise.oracles import filtered_innovation as innovation_oracle
 from onespp.render.errors import InputError
-from tests.support import innovation_oracle
 from tests.support.frames import make_frame, noisy, translation, with_images
 from tests.support.recordings import compiled, taking_turns
 
@@ -91,7 +91,8 @@ def test_it_is_the_formula_where_light_falls_on_a_texture_and_debts_are_paid(mon
         specular, emission = light * frame["specular"], np.zeros((19, 26, 3))
         frames[i] = with_images(frame, **images, specular=specular, emission=emission,
                                 color=images["direct"] + images["indirect"])
-    method = FilteredInnovation(smoothing=4, levels=3, sharp_smoothing=2, sharp_levels=2)
+    method = FilteredInnovation(innovation_levels=4, output_levels=3,
+                                sharp_innovation_levels=2, sharp_output_levels=2)
     image, _ = run(method, frames)
     np.testing.assert_allclose(image, innovation_oracle.run(frames, method), rtol=1e-3, atol=5e-5)
     assert image.min() == 0

@@ -8,7 +8,7 @@ from onespp.denoise.methods.outliers import FEWEST, RemoveOutliers, energy_kept
 from onespp.denoise.oracles.filters import pairs, plane_weight_distance, read
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from tests.support.frames import make_frame, noisy, translation, with_images
 from tests.support.recordings import compiled
 
@@ -179,7 +179,7 @@ def test_bad_parameters_are_refused(options):
 
 def test_the_command_says_what_it_took(tmp_path, call):
     folder, frames = tmp_path / "wall", [noisy(make_frame(9, 11, index=i), i) for i in range(2)]
-    sequence = Sequence.create(folder, Manifest(
+    sequence = FrameSequence.create(folder, Manifest(
         scene="wall", frames=(0, 1), width=11, height=9, channels=tuple(frames[0].images),
         objects=("wall", "board")))
     for frame in frames:

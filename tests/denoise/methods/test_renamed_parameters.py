@@ -22,7 +22,7 @@ from onespp.denoise.run.sequence import denoise_sequence
 from onespp.denoise.studies.tune import Search, starting_point
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from tests.denoise.score.test_compare import comparison, scores
 from tests.support.frames import make_frame
 
@@ -93,7 +93,7 @@ def test_parameters_of_other_methods_are_left_alone(name):
 
 def test_results_of_the_last_version_are_gone_on_with(tmp_path, monkeypatch):
     """Not removed as those of other parameters."""
-    sequence = Sequence.create(tmp_path / "a", Manifest(
+    sequence = FrameSequence.create(tmp_path / "a", Manifest(
         scene="made", frames=(0, 1), width=7, height=5, objects=("wall", "board"),
         channels=("color", "normal", "depth", "id")))
     sequence.write_frame(make_frame(5, 7))
@@ -101,7 +101,7 @@ def test_results_of_the_last_version_are_gone_on_with(tmp_path, monkeypatch):
     sequence.write_run("svgf", run.model_copy(
         update={"parameters": former(Svgf(levels=1))}))
     removed = []
-    monkeypatch.setattr(Sequence, "remove_results", lambda _, name: removed.append(name))
+    monkeypatch.setattr(FrameSequence, "remove_results", lambda _, name: removed.append(name))
     denoise_sequence(sequence, Svgf(levels=1), "svgf")
     assert removed == []
     assert sequence.read_run("svgf").parameters == parameters(Svgf(levels=1))
@@ -126,13 +126,14 @@ def test_scores_of_two_versions_have_the_same_parameters():
 def test_a_search_of_the_last_version_is_gone_on_with(tmp_path, monkeypatch):
     file = tmp_path / "tried.json"
     file.write_text(json.dumps({json.dumps(former(Svgf()), sort_keys=True): 31.5}))
-    monkeypatch.setattr("onespp.denoise.studies.tune.mean_psnr", lambda *_: pytest.fail("measured twice"))
+    monkeypatch.setattr("onespp.denoise.studies.tune.mean_psnr",
+                        lambda *_: pytest.fail("measured twice"))
     search = Search("svgf", starting_point("svgf", {}), [], file)
     assert search.value(starting_point("svgf", {})) == 31.5
 
 
 def test_the_command_says_it_in_one_line(call, tmp_path):
-    sequence = Sequence.create(tmp_path / "a", Manifest(
+    sequence = FrameSequence.create(tmp_path / "a", Manifest(
         scene="made", frames=(0,), width=7, height=5, objects=("wall", "board"),
         channels=("color", "normal", "depth", "id")))
     sequence.write_frame(make_frame(5, 7))

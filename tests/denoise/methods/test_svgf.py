@@ -3,8 +3,8 @@ import pytest
 
 from onespp.denoise.history.records import WORDS
 from onespp.denoise.methods.svgf import Svgf
+from onespp.denoise.oracles import svgf as svgf_oracle
 from onespp.render.errors import InputError
-from tests.support import svgf_oracle
 from tests.support.frames import make_frame, translation, turn, with_images
 from tests.support.recordings import compiled, taking_turns
 

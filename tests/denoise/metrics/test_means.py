@@ -20,7 +20,7 @@ from onespp.denoise.score.scorecard import INPUT, read_scores
 from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Run
-from onespp.render.files.sequence import Reference, Sequence
+from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.frame import Frame
 from tests.support.made_sequence import (
     COUNT,
@@ -35,7 +35,7 @@ from tests.support.made_sequence import (
 BLACK = np.zeros((HEIGHT, WIDTH, 3), np.float32)
 
 
-def blacken(sequence: Sequence, i: int, *methods: str) -> None:
+def blacken(sequence: FrameSequence, i: int, *methods: str) -> None:
     """A frame before the light goes on."""
     frame = sequence.read_frame(i)
     sequence.write_frame(Frame(i, {"color": BLACK}, frame.camera_from_world,
@@ -58,7 +58,7 @@ def shown(scores) -> str:
 def test_a_black_frame_is_in_no_mean_of_decibels(tmp_path):
     sequence = make_sequence(tmp_path / "made")
     blacken(sequence, 1, "rough", "fine")
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     for name in (INPUT, "rough", "fine"):
         values = decibels(scores, name)
         assert values[1] == PSNR_CAP
@@ -80,9 +80,9 @@ def test_a_black_frame_is_in_no_mean_of_decibels(tmp_path):
 def test_what_a_method_leaves_in_a_black_frame_does_not_help_it_and_is_told(tmp_path):
     sequence = make_sequence(tmp_path / "made")
     blacken(sequence, 1, "rough", "fine")
-    clean = score(sequence, pictures=False).methods["fine"]["psnr_srgb"]
+    clean = score(sequence).methods["fine"]["psnr_srgb"]
     sequence.write_result("fine", 1, BLACK + np.float32(2e-4))  # a trace: many dB, no merit
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     left = decibels(scores, "fine")[1]
     assert left > clean
     assert scores.methods["fine"]["psnr_srgb"] == clean
@@ -92,7 +92,7 @@ def test_what_a_method_leaves_in_a_black_frame_does_not_help_it_and_is_told(tmp_
 def test_a_method_that_is_identical_on_one_frame_is_judged_on_the_others(tmp_path):
     sequence = make_sequence(tmp_path / "made")
     sequence.write_result("fine", 2, sequence.read_reference(2).color)
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     values = decibels(scores, "fine")
     assert scores.methods["fine"]["psnr_srgb"] == pytest.approx(np.mean(
         [values[0], values[1], values[3]]))
@@ -105,7 +105,7 @@ def test_a_method_that_is_identical_throughout_has_the_cap(tmp_path):
     for i in sequence.frames:
         sequence.write_result("copy", i, sequence.read_reference(i).color)
     sequence.write_run("copy", Run(method="files"))
-    assert score(sequence, pictures=False).methods["copy"]["psnr_srgb"] == PSNR_CAP
+    assert score(sequence).methods["copy"]["psnr_srgb"] == PSNR_CAP
 
 
 @pytest.mark.parametrize(("values", "untouched", "mean"), [
@@ -131,9 +131,9 @@ def test_decibels_alone():
 
 def test_a_comparison_is_not_decided_by_a_frame_that_became_identical(tmp_path):
     sequence = make_sequence(tmp_path / "made")
-    before = score(sequence, pictures=False)
+    before = score(sequence)
     sequence.write_result("fine", 1, sequence.read_reference(1).color)
-    after = score(sequence, pictures=False)
+    after = score(sequence)
     found = comparison(before, after, ["fine"])
     change = next(c for c in found.changes if c.measure == "psnr_srgb")
     assert change.frames == COUNT - 1
@@ -144,7 +144,7 @@ def test_a_comparison_is_not_decided_by_a_frame_that_became_identical(tmp_path):
 # References with holes
 
 
-def hole(sequence: Sequence, i: int, pixels: int, value: float = np.nan) -> np.ndarray:
+def hole(sequence: FrameSequence, i: int, pixels: int, value: float = np.nan) -> np.ndarray:
     reference = sequence.read_reference(i)
     color = reference.color.copy()
     color.reshape(-1, 3)[:pixels, 1] = value
@@ -157,7 +157,7 @@ def test_holes_in_a_reference_are_counted_and_told(tmp_path, value):
     sequence = make_sequence(tmp_path / "made")
     for i, count in ((0, 2), (3, 3)):
         hole(sequence, i, count, value)
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     assert scores.reference_non_finite_pixels == 5
     assert ("References have 5 pixels that are not finite (frames 0,3), which were not judged"
             in shown(scores))
@@ -166,7 +166,7 @@ def test_holes_in_a_reference_are_counted_and_told(tmp_path, value):
 
 
 def test_a_whole_reference_has_no_note(tmp_path):
-    scores = score(make_sequence(tmp_path / "made"), pictures=False)
+    scores = score(make_sequence(tmp_path / "made"))
     assert scores.reference_non_finite_pixels == 0
     assert "finite" not in shown(scores)
 
@@ -175,7 +175,7 @@ def test_a_reference_that_is_mostly_holes_is_refused(tmp_path):
     sequence = make_sequence(tmp_path / "made")
     hole(sequence, 2, HEIGHT * WIDTH)
     with pytest.raises(InputError) as error:
-        score(sequence, pictures=False)
+        score(sequence)
     assert f"frame 2 in {sequence.folder} has {HEIGHT * WIDTH} of {HEIGHT * WIDTH} pixels" in str(
         error.value)
 

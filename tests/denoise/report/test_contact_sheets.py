@@ -19,6 +19,7 @@ from onespp.denoise.report.contact_sheets import (
     _columns,
     contact_sheet,
     display_error,
+    draw_pictures,
     movie_pictures,
 )
 from onespp.denoise.report.movie import MovieError, write_movie
@@ -41,7 +42,14 @@ from tests.support.made_sequence import COUNT, HEIGHT, WIDTH, make_sequence, tru
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory):
     sequence = make_sequence(tmp_path_factory.mktemp("drawn") / "made")
-    return sequence, score(sequence)
+    return sequence, draw(sequence)
+
+
+def draw(sequence, progress=None):
+    """Scores, with what drawing them noted."""
+    scores = score(sequence, progress=progress)
+    trouble = draw_pictures(sequence, scores, progress=progress)
+    return scores.model_copy(update={"notes": [*scores.notes, *trouble]})
 
 
 def decoded(path) -> np.ndarray:
@@ -74,7 +82,7 @@ def test_without_a_reference_there_are_pictures_but_no_plot(tmp_path):
     pictures = sequence.folder / "pictures"
     pictures.mkdir()
     (pictures / "speed_against_error.png").write_bytes(b"of an older run")
-    score(sequence)
+    draw(sequence)
     assert files(pictures) == {"sheet_0000.png", "sheet_0002.png", "sheet_0003.png",
                                "sequence.mp4"}
 
@@ -83,14 +91,14 @@ def test_sheets_of_frames_that_are_no_longer_chosen_go(tmp_path):
     sequence = make_sequence(tmp_path / "made", methods=False)
     (sequence.folder / "pictures").mkdir()
     (sequence.folder / "pictures/sheet_0099.png").write_bytes(b"old")
-    score(sequence)
+    draw(sequence)
     assert "sheet_0099.png" not in files(sequence.folder / "pictures")
 
 
 def test_progress_counts_up_to_the_total(tmp_path):
     told = []
     sequence = make_sequence(tmp_path / "made", methods=False)
-    score(sequence, progress=lambda done, total, what: told.append((done, total, what)))
+    draw(sequence, progress=lambda done, total, what: told.append((done, total, what)))
     drawing = [(done, total) for done, total, what in told if what == "pictures"]
     assert drawing == [(i + 1, len(drawing)) for i in range(len(drawing))]
 
@@ -213,7 +221,7 @@ def test_without_ffmpeg_there_is_one_sentence_and_all_else(tmp_path, monkeypatch
 
     monkeypatch.setattr(onespp.denoise.report.movie.imageio_ffmpeg, "get_ffmpeg_exe", none)
     sequence = make_sequence(tmp_path / "made")
-    scores = score(sequence)
+    scores = draw(sequence)
     assert [note for note in scores.notes if "no movie" in note and "\n" not in note]
     assert "sequence.mp4" not in files(sequence.folder / "pictures")
     assert "sheet_0000.png" in files(sequence.folder / "pictures")
@@ -226,7 +234,8 @@ def test_an_ffmpeg_that_fails_is_named_with_its_reason(tmp_path, monkeypatch, sc
     program = tmp_path / "ffmpeg"
     program.write_text(script)
     program.chmod(0o755)
-    monkeypatch.setattr(onespp.denoise.report.movie.imageio_ffmpeg, "get_ffmpeg_exe", lambda: str(program))
+    monkeypatch.setattr(onespp.denoise.report.movie.imageio_ffmpeg, "get_ffmpeg_exe",
+                        lambda: str(program))
     big = np.zeros((512, 512, 3), np.uint8)
     with pytest.raises(MovieError, match="broken"):
         write_movie(tmp_path / "out/a.mp4", [big, big], 24)
@@ -255,7 +264,7 @@ def test_an_interrupted_sheet_leaves_nothing_partial(tmp_path, monkeypatch):
     sequence = make_sequence(tmp_path / "made", methods=False)
     monkeypatch.setattr(Image.Image, "save", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        score(sequence)
+        draw(sequence)
     assert files(sequence.folder / "pictures") == set()
     assert json.loads((sequence.folder / "scores.json").read_text())["methods"][INPUT]
 

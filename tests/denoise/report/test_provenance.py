@@ -12,11 +12,12 @@ from html import unescape
 import pytest
 
 from onespp.denoise.report.html import write_report
-from onespp.denoise.report.provenance import commands, provenance
+from onespp.denoise.report.provenance import provenance
+from onespp.denoise.score.commands import commands
 from onespp.denoise.score.scorecard import read_scores
 from onespp.denoise.score.sequence import score
 from onespp.render.files.json_file import format_json
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.files.times import MethodTime, Times, read_times
 from onespp.render.host.machine import machine
 from tests.support.made_sequence import COUNT, METHODS, make_sequence
@@ -48,11 +49,11 @@ def test_each_command_keeps_its_line_as_it_was_typed_and_the_report_shows_all(ca
 def test_numbers_say_which_machine_they_are_from(call, tmp_path):
     made = make_sequence(tmp_path / "made")
     assert call("denoise", made.folder, "--method", "spatial-none", "--name", "x")[0] == 2
-    scores = score(made, pictures=False)
+    scores = score(made)
     assert scores.machine == scores.methods["rough"].machine == ""  # not known, and not made up
     run = made.read_run("rough").model_copy(update={"machine": "A CPU, 8 cores"})
     made.write_run("rough", run)
-    assert score(made, pictures=False).methods["rough"].machine == "A CPU, 8 cores"
+    assert score(made).methods["rough"].machine == "A CPU, 8 cores"
     facts = provenance(made, read_scores(made.folder / "scores.json"))
     assert ("results", "A CPU, 8 cores; llvm, 2 threads") in facts["machines"]
     made.write_run("fine", run.model_copy(update={"method": "fine", "machine": "B CPU"}))
@@ -74,14 +75,14 @@ def test_the_machine_is_described_and_not_named():
 
 def test_a_sequence_that_goes_on_keeps_all_its_commands_once(tmp_path):
     for line, frames in (("a", (0,)), ("b", (1,)), ("a", (0,))):
-        made = Sequence.create(tmp_path / "s", small_manifest(frames=frames, commands=(line,)))
+        made = FrameSequence.create(tmp_path / "s", small_manifest(frames=frames, commands=(line,)))
     assert made.manifest.commands == ("a", "b")
-    assert Sequence.open(tmp_path / "s").manifest.commands == ("a", "b")
+    assert FrameSequence.open(tmp_path / "s").manifest.commands == ("a", "b")
 
 
 def test_what_was_not_recorded_is_said_and_not_made_up(tmp_path):
     made = make_sequence(tmp_path / "made")
-    scores = score(made, pictures=False, command="onespp score made")
+    scores = score(made, command="onespp score made")
     page = write_report(made, scores)
     assert listed(page) == ["onespp score made"]
     assert "No command line was recorded for the sequence, rough, fine." in page.read_text()
@@ -92,7 +93,7 @@ def test_what_was_not_recorded_is_said_and_not_made_up(tmp_path):
 
 def test_files_of_before_commands_were_recorded_still_open(tmp_path):
     made = make_sequence(tmp_path / "made")
-    score(made, pictures=False, command="onespp score made")
+    score(made, command="onespp score made")
     one = MethodTime(parameters={}, first_ms=1.0, ms=1.0, ms_quartiles=(1.0, 1.0), ratio=1.0,
                      ratio_quartiles=(1.0, 1.0))
     (made.folder / "times.json").write_text(format_json(Times(
@@ -105,7 +106,7 @@ def test_files_of_before_commands_were_recorded_still_open(tmp_path):
         old = old if name == "times.json" else re.sub(r',\s*"machine": "[^"]*"', "", old)
         assert len(old) < len(text)
         (made.folder / name).write_text(old)
-    sequence = Sequence.open(made.folder)
+    sequence = FrameSequence.open(made.folder)
     scores = read_scores(made.folder / "scores.json")
     assert scores.commands == []
     assert len(scores.frames) == COUNT

@@ -17,7 +17,7 @@ from onespp.denoise.report.html import EDGES, render_page, write_report
 from onespp.denoise.report.page_images import GUIDE, RADIANCE, WHOLE, pack
 from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from tests.support.report_sequence import CHANNELS, COUNT, METHODS, make_report_sequence
 from tests.support.small_sequence import contents
 
@@ -25,7 +25,7 @@ from tests.support.small_sequence import contents
 @pytest.fixture(scope="module")
 def reported(tmp_path_factory):
     sequence = make_report_sequence(tmp_path_factory.mktemp("report") / "made")
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     return sequence, scores, write_report(sequence, scores)
 
 
@@ -114,7 +114,7 @@ def test_nothing_in_the_page_comes_from_elsewhere(reported):
 
 def test_files_that_the_report_no_longer_has_go_and_others_stay(tmp_path):
     sequence = make_report_sequence(tmp_path / "made", frames=2)
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     folder = write_report(sequence, scores).parent
     (folder / "mine.txt").write_text("kept")
     write_report(sequence, scores, ["albedo"])
@@ -125,14 +125,14 @@ def test_files_that_the_report_no_longer_has_go_and_others_stay(tmp_path):
 
 def test_an_overwritten_sequence_loses_its_report(tmp_path):
     sequence = make_report_sequence(tmp_path / "made", frames=1)
-    write_report(sequence, score(sequence, pictures=False))
-    Sequence.create(sequence.folder, sequence.manifest, overwrite=True)
+    write_report(sequence, score(sequence))
+    FrameSequence.create(sequence.folder, sequence.manifest, overwrite=True)
     assert set(contents(sequence.folder)) == {"manifest.json"}
 
 
 def test_equal_input_gives_an_equal_report(tmp_path):
     sequence = make_report_sequence(tmp_path / "made", frames=2)
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     folder = write_report(sequence, scores).parent
     first = contents(folder)
     write_report(sequence, scores)
@@ -185,7 +185,7 @@ def test_names_from_files_cannot_become_markup(tmp_path):
     evil = "</script><script>alert(1)</script>"
     sequence = make_report_sequence(tmp_path / "made", frames=1, scene=evil, about=evil,
                                     objects=("wall", evil))
-    text = write_report(sequence, score(sequence, pictures=False)).read_text()
+    text = write_report(sequence, score(sequence)).read_text()
     assert evil not in text
     assert text.count("</script>") == 2
 
@@ -206,7 +206,7 @@ def test_times_measured_in_turns_are_told_apart(reported):
 
 def test_the_page_says_where_glossy_pixels_cannot_be_told(reported, tmp_path):
     assert "no pixel counts as glossy" in reported[2].read_text()
-    sequence = Sequence(reported[0].folder, reported[0].manifest.model_copy(
+    sequence = FrameSequence(reported[0].folder, reported[0].manifest.model_copy(
         update={"channels": (*CHANNELS, "roughness")}))
     assert "no pixel counts as glossy" not in render_page(sequence, reported[1], {})
 
@@ -217,7 +217,7 @@ def test_the_page_says_where_glossy_pixels_cannot_be_told(reported, tmp_path):
 def test_without_references_there_are_still_pictures(tmp_path):
     sequence = make_report_sequence(tmp_path / "made", frames=1)
     (sequence.folder / "reference/0000.exr").unlink()
-    data = page_data(write_report(sequence, score(sequence, pictures=False)))
+    data = page_data(write_report(sequence, score(sequence)))
     assert not data["hasReference"]
     assert data["metrics"] == []
     assert {m["name"] for m in data["methods"]} == {"input", *METHODS}

@@ -27,7 +27,7 @@ PATIENCE = 120_000  # ms; a slow machine is not a failure
 def report(tmp_path_factory):
     """(sequence, scores, address of the page)."""
     sequence = make_report_sequence(tmp_path_factory.mktemp("a report") / "made")
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     return sequence, scores, write_report(sequence, scores).as_uri()
 
 
@@ -317,7 +317,7 @@ def test_everything_that_takes_the_focus_has_a_name(opened):
 
 def test_a_missing_file_is_said_in_its_place(browser, report, tmp_path):
     sequence = make_report_sequence(tmp_path / "made", frames=1)
-    page_file = write_report(sequence, score(sequence, pictures=False))
+    page_file = write_report(sequence, score(sequence))
     (page_file.parent / "data/denoised/fine/0000.js").unlink()
     page = new_page(browser)
     page.goto(page_file.as_uri() + "#frame=0&a=input&b=fine")
@@ -332,7 +332,7 @@ def test_without_references_it_shows_pictures_and_no_empty_plots(browser, tmp_pa
     (sequence.folder / "reference/0000.exr").unlink()
     page, errors = new_page(browser), []
     page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(write_report(sequence, score(sequence, pictures=False)).as_uri())
+    page.goto(write_report(sequence, score(sequence)).as_uri())
     page.wait_for_selector(READY)
     page.wait_for_timeout(100)
     assert errors == []
@@ -400,7 +400,7 @@ def test_the_flip_map_is_that_of_the_library(browser, report, workers):
 
 def test_hollow_points_are_of_times_not_measured_in_turns(browser, report, tmp_path):
     sequence = make_report_sequence(tmp_path / "made", frames=2)
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     methods = {name: method.model_copy(update={"interleaved": name == "fine"})
                for name, method in scores.methods.items()}
     page = new_page(browser)

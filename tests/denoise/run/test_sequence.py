@@ -10,7 +10,7 @@ from onespp.denoise.methods.temporal import Temporal
 from onespp.denoise.run.sequence import ALONE, Pace, denoise_sequence
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from tests.support.frames import make_frame, noisy, translation
 
 H, W, FRAMES = 9, 11, ALONE + 4
@@ -18,7 +18,7 @@ H, W, FRAMES = 9, 11, ALONE + 4
 
 @pytest.fixture
 def sequence(tmp_path):
-    made = Sequence.create(tmp_path, Manifest(
+    made = FrameSequence.create(tmp_path, Manifest(
         scene="wall", frames=f"0:{FRAMES}", width=W, height=H,
         channels=("color", "normal", "position", "depth", "id"), objects=("wall", "board")))
     for i in range(FRAMES):
@@ -40,7 +40,7 @@ def test_results_are_those_of_the_method_called_frame_by_frame(sequence):
 
 def test_files_are_read_and_written_beside_the_calls(sequence, monkeypatch):
     """0.1 s in each call, 0.05 s in each file read: beside one another 0.1 s a frame."""
-    read = Sequence.read_frame
+    read = FrameSequence.read_frame
 
     def slowly(self, *arguments):
         time.sleep(0.05)
@@ -51,7 +51,7 @@ def test_files_are_read_and_written_beside_the_calls(sequence, monkeypatch):
             time.sleep(0.1)
             return frame["color"], state
 
-    monkeypatch.setattr(Sequence, "read_frame", slowly)
+    monkeypatch.setattr(FrameSequence, "read_frame", slowly)
     paces, threads = [], threading.active_count()
     denoise_sequence(sequence, Slow(), "slow", on_pace=paces.append)
     assert threading.active_count() == threads
@@ -84,6 +84,6 @@ def test_a_failed_write_is_told(sequence, monkeypatch):
     def refuse(self, *arguments):
         raise InputError("the disk is full")
 
-    monkeypatch.setattr(Sequence, "write_result", refuse)
+    monkeypatch.setattr(FrameSequence, "write_result", refuse)
     with pytest.raises(InputError, match="disk is full"):
         denoise_sequence(sequence, Temporal(), "temporal")

@@ -16,7 +16,7 @@ from onespp.denoise.score.scorecard import INPUT, read_scores
 from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest, Run
-from onespp.render.files.sequence import Reference, Sequence
+from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.frame import Frame
 
 H, W, FRAMES = 40, 50, 2
@@ -32,10 +32,10 @@ def linear(image: np.ndarray) -> np.ndarray:
 
 
 def render(folder: Path, seed: int, bias: float = BIAS, noise: float = 0.0,
-           method: str = "mine") -> Sequence:
+           method: str = "mine") -> FrameSequence:
     """Results that are `bias` too bright and have noise of SIGMA; so does the input, unbiased."""
     rng = np.random.default_rng([9, seed])
-    sequence = Sequence.create(folder, Manifest(
+    sequence = FrameSequence.create(folder, Manifest(
         scene="made", frames=tuple(range(FRAMES)), width=W, height=H, seed=seed, reference_spp=64,
         channels=("color",), objects=("all",)))
     for i in range(FRAMES):
@@ -87,14 +87,14 @@ def test_the_noise_of_the_reference_is_not_taken_for_bias(tmp_path):
 
 
 def test_a_score_with_seeds_has_the_split_in_its_file_and_table(renders):
-    scores = score(renders[0], pictures=False, seeds=renders[1:])
+    scores = score(renders[0], seeds=renders[1:])
     assert scores.methods["mine"].split == split_errors(renders, ["mine"])["mine"]
     assert read_scores(renders[0].folder / "scores.json") == scores
     console = Console(width=100, file=io.StringIO(), color_system=None)
     print_splits(scores, console)
     line = next(x for x in console.file.getvalue().splitlines() if "mine" in x)
     assert "0.0499" in line or "0.0500" in line or "0.0501" in line
-    assert score(renders[0], pictures=False).methods["mine"].split is None
+    assert score(renders[0]).methods["mine"].split is None
 
 
 def test_a_method_that_one_render_lacks_is_left_out(renders, tmp_path):
@@ -107,6 +107,6 @@ def test_renders_of_one_seed_or_of_something_else_are_refused(renders, tmp_path)
     with pytest.raises(InputError, match=r"seeds are 0, 0.*--seed"):
         split_errors([renders[0], same], ["mine"])
     manifest = renders[1].manifest.model_copy(update={"scene": "else"})
-    other = Sequence.create(tmp_path / "else", manifest)
+    other = FrameSequence.create(tmp_path / "else", manifest)
     with pytest.raises(InputError, match="has another scene"):
         split_errors([renders[0], other], ["mine"])

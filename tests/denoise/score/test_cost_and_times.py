@@ -92,7 +92,7 @@ def test_a_score_takes_the_times_measured_in_turns_for_the_same_settings(tmp_pat
     denoise_sequence(sequence, Sleeper(3.0), "sleeper")
     denoise_sequence(sequence, Sleeper(3.0), "other")
     times = time_methods(sequence, {"sleeper": Sleeper(3.0), "other": Sleeper(1.0)}, rounds=1)
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     sleeper, other = scores.methods["sleeper"], scores.methods["other"]
     assert sleeper.interleaved
     assert sleeper.ms_per_frame == times.methods["sleeper"].ms
@@ -142,4 +142,4 @@ def test_a_run_says_how_much_memory_its_method_took(tmp_path):
     sequence = small_sequence(tmp_path / "a")
     assert 50 < denoise_sequence(sequence, Greedy(), "greedy").peak_mb < 120
     assert denoise_sequence(sequence, Sleeper(), "modest").peak_mb < 30
-    assert score(sequence, pictures=False).methods["greedy"].peak_mb > 50
+    assert score(sequence).methods["greedy"].peak_mb > 50

@@ -18,7 +18,7 @@ from onespp.denoise.score.scorecard import INPUT, read_scores
 from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Run
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from tests.support.made_sequence import COUNT, HEIGHT, METHODS, SPP, WIDTH, make_sequence, truth
 
 EVERY_FRAME = [m for m, row in METRICS.items() if (row.most_frames or COUNT) >= COUNT]
@@ -27,7 +27,7 @@ EVERY_FRAME = [m for m, row in METRICS.items() if (row.most_frames or COUNT) >= 
 @pytest.fixture(scope="module")
 def scored(tmp_path_factory):
     sequence = make_sequence(tmp_path_factory.mktemp("scored") / "made")
-    return sequence, score(sequence, pictures=False)
+    return sequence, score(sequence)
 
 
 def strict_json(text: str):
@@ -93,7 +93,7 @@ def test_a_perfect_method_scores_the_reference_floor(tmp_path):
     for i in sequence.frames:
         sequence.write_result("perfect", i, truth(i).astype(np.float32))
     sequence.write_run("perfect", Run(method="perfect"))
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     assert scores.reference_floor_db is not None
     assert scores.methods["perfect"]["psnr_srgb"] == pytest.approx(
         scores.reference_floor_db, abs=0.3)
@@ -144,7 +144,7 @@ def test_the_csv_has_a_row_for_each_method_and_frame(scored):
 def test_the_same_sequence_gives_the_same_files(scored):
     sequence, _ = scored
     before = [(sequence.folder / name).read_bytes() for name in ("scores.json", "scores.csv")]
-    score(Sequence.open(sequence.folder), pictures=False)
+    score(FrameSequence.open(sequence.folder))
     assert [(sequence.folder / n).read_bytes() for n in ("scores.json", "scores.csv")] == before
 
 
@@ -161,7 +161,7 @@ def test_a_scores_file_with_nan_or_nonsense_is_refused_in_one_sentence(scored, t
 def test_progress_is_told_to_the_end(tmp_path):
     told = []
     sequence = make_sequence(tmp_path / "made", methods=False)
-    score(sequence, pictures=False, progress=lambda *what: told.append(what))
+    score(sequence, progress=lambda *what: told.append(what))
     assert told == [(i + 1, COUNT, "score") for i in range(COUNT)]
 
 
@@ -170,7 +170,7 @@ def test_progress_is_told_to_the_end(tmp_path):
 
 def test_without_a_reference_all_but_the_error_is_reported(tmp_path):
     sequence = make_sequence(tmp_path / "made", reference=False)
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     data = strict_json((sequence.folder / "scores.json").read_text())
     assert data["reference_spp"] is None
     assert data["reference_floor_db"] is None
@@ -188,7 +188,7 @@ def test_a_method_with_some_frames_is_scored_on_those_and_says_so(tmp_path):
     sequence = make_sequence(tmp_path / "made")
     for i in (2, 3):
         (sequence.folder / "denoised/fine" / f"{i:04d}.exr").unlink()
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     assert [row.frame for row in scores.methods["fine"].per_frame] == [0, 1]
     assert any("fine has 2 of 4 frames" in note for note in scores.notes)
     text = shown(scores)
@@ -202,7 +202,7 @@ def test_a_method_with_some_frames_is_scored_on_those_and_says_so(tmp_path):
 def test_a_method_that_began_and_has_no_frame_yet_is_listed_without_numbers(tmp_path):
     sequence = make_sequence(tmp_path / "made", methods=False)
     sequence.write_run("begun", Run(method="begun"))
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     assert scores.methods["begun"]["psnr_srgb"] is None
     assert "0/4" in shown(scores)
 
@@ -210,7 +210,7 @@ def test_a_method_that_began_and_has_no_frame_yet_is_listed_without_numbers(tmp_
 def test_frames_without_a_reference_have_no_error_and_a_note(tmp_path):
     sequence = make_sequence(tmp_path / "made")
     (sequence.folder / "reference/0003.exr").unlink()
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     fine = scores.methods["fine"]
     assert fine.per_frame[3]["psnr_srgb"] is None
     assert fine["psnr_srgb"] == pytest.approx(
@@ -222,7 +222,7 @@ def test_a_sequence_that_is_half_rendered_is_scored_as_far_as_it_is(tmp_path):
     sequence = make_sequence(tmp_path / "made")
     for path in (sequence.folder / "frames").glob("0003.*"):
         path.unlink()
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     assert scores.frames == [0, 1, 2]
     assert any("3 of 4 frames are rendered" in note for note in scores.notes)
 
@@ -234,7 +234,7 @@ def test_non_finite_pixels_are_counted_reported_and_scored_as_black(tmp_path):
     sequence.write_result("fine", 1, broken)
     broken[3, 4:6] = 0
     expected = measure(broken, sequence.read_reference(1).color)
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     fine = scores.methods["fine"]
     assert {m: fine.per_frame[1][m] for m in EVERY_FRAME} == {m: expected[m] for m in EVERY_FRAME}
     assert [row.non_finite_pixels for row in fine.per_frame] == [0, 2, 0, 0]
@@ -248,7 +248,7 @@ def test_a_reference_of_unknown_variance_has_no_floor(tmp_path):
         reference = sequence.read_reference(i)
         sequence.write_reference(i, replace(
             reference, variance=np.full_like(reference.variance, np.nan)))
-    scores = score(sequence, pictures=False)
+    scores = score(sequence)
     assert scores.reference_floor_db is None
     assert scores.methods[INPUT]["psnr_srgb"] is not None
     assert scores.has_reference
@@ -261,7 +261,7 @@ def test_an_unknown_method_is_refused_with_what_there_is(scored):
 
 
 def test_chosen_methods_alone_are_scored(tmp_path):
-    scores = score(make_sequence(tmp_path / "made"), methods=["rough", INPUT], pictures=False)
+    scores = score(make_sequence(tmp_path / "made"), methods=["rough", INPUT])
     assert list(scores.methods) == [INPUT, "rough"]
 
 
@@ -275,12 +275,12 @@ def test_a_sequence_without_frames_is_refused(tmp_path):
 
 def test_a_damaged_result_ends_in_an_error_and_keeps_older_scores(tmp_path):
     sequence = make_sequence(tmp_path / "made")
-    score(sequence, pictures=False)
+    score(sequence)
     before = (sequence.folder / "scores.json").read_bytes()
     path = sequence.folder / "denoised/fine/0002.exr"
     path.write_bytes(path.read_bytes()[:-40])
     with pytest.raises(InputError, match=r"0002\.exr"):
-        score(sequence, pictures=False)
+        score(sequence)
     assert (sequence.folder / "scores.json").read_bytes() == before
 
 

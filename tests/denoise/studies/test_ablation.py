@@ -2,18 +2,18 @@ import numpy as np
 import pytest
 
 from onespp.denoise.catalog import parameters
-from onespp.denoise.cli.ablate import ablation
+from onespp.denoise.cli.ablate import ablate as ablate_command
 from onespp.denoise.studies.ablation import ablate, markdown, variants
 from onespp.render.cli.terminal import run
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest
-from onespp.render.files.sequence import Reference, Sequence
+from onespp.render.files.sequence import FrameSequence, Reference
 from tests.support.frames import make_frame, noisy
 
 
 def sequence_in(folder, reference=True):
     clean = [make_frame(16, 20, index=i) for i in range(3)]
-    sequence = Sequence.create(folder, Manifest(
+    sequence = FrameSequence.create(folder, Manifest(
         scene="wall", frames=(0, 1, 2), width=20, height=16,
         reference_spp=64 if reference else None, objects=("wall", "board"),
         channels=("color", "normal", "position", "depth", "id", "albedo")))
@@ -44,7 +44,7 @@ def test_a_method_without_switches_and_a_sequence_without_reference_are_refused(
 
 def test_the_table_says_what_the_parts_are_worth(tmp_path, capsys):
     folder = sequence_in(tmp_path / "wall").folder
-    rows = ablate(Sequence.open(folder), variants("svgf"))
+    rows = ablate(FrameSequence.open(folder), variants("svgf"))
     values = {row.name: row.means["psnr_srgb"] or 0.0 for row in rows}
     whole, alone = values["as it is"], values["without accumulate"]
     assert alone < whole
@@ -52,7 +52,7 @@ def test_the_table_says_what_the_parts_are_worth(tmp_path, capsys):
     text = markdown("svgf", {"wall": rows})
     assert text.splitlines()[0] == "| `svgf` | wall PSNR | wall FLIP | wall flicker |"
     assert f"| without accumulate | {alone:.2f} ({alone - whole:+.2f}) |" in text
-    run(ablation, [str(folder)])
+    run(ablate_command, [str(folder)])
     printed = capsys.readouterr().out
     assert text in printed
     assert "wall: wall, 3 frames of 20x16, seed 0" in printed

@@ -15,7 +15,7 @@ from tests.support.report_sequence import make_report_sequence
 @pytest.fixture(scope="module")
 def scores(tmp_path_factory):
     sequence = make_report_sequence(tmp_path_factory.mktemp("lead") / "made")
-    return score(sequence, pictures=False), sequence.folder
+    return score(sequence), sequence.folder
 
 
 def test_the_lead_is_the_difference_of_the_scores(scores):

@@ -11,7 +11,7 @@ from onespp.denoise.metrics.tonemap import srgb_from_linear
 from onespp.denoise.studies.tune import Case, Search, mean_psnr, neighbours, starting_point
 from onespp.render.channels import FRAME
 from onespp.render.files.manifest import Manifest
-from onespp.render.files.sequence import Reference, Sequence
+from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.frame import Frame
 from tests.support.frames import make_frame, noisy
 
@@ -41,7 +41,8 @@ def test_it_goes_on_from_what_it_had_tried(case, tmp_path, monkeypatch):
     first = Search("temporal", start, [case], file)
     result = first.run(["alpha"], factors=(2.0,))
     again = Search("temporal", start, [case], file)
-    monkeypatch.setattr("onespp.denoise.studies.tune.mean_psnr", lambda *_: pytest.fail("measured twice"))
+    monkeypatch.setattr("onespp.denoise.studies.tune.mean_psnr",
+                        lambda *_: pytest.fail("measured twice"))
     assert again.run(["alpha"], factors=(2.0,)) == result
     assert len(json.loads(file.read_text())) == len(first.tried) > 2
 
@@ -63,7 +64,7 @@ def test_neighbours_are_a_step_away(value, expected):
 def folder(tmp_path):
     truth = make_frame(16, 20)
     frames = [noisy(truth, seed=i) for i in range(2)]
-    sequence = Sequence.create(tmp_path / "walls", Manifest(
+    sequence = FrameSequence.create(tmp_path / "walls", Manifest(
         scene="walls", frames=(0, 1), width=20, height=16, seed=0, reference_spp=64,
         channels=tuple(k for k in truth.images if k in FRAME), objects=("wall", "board")))
     for i, frame in enumerate(frames):

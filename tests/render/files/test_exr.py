@@ -79,7 +79,8 @@ def test_the_deprecated_interface_is_not_used(tmp_path, monkeypatch):
 def test_many_reads_at_once_do_not_end_the_process(tmp_path):
     """With `InputFile` this was a segmentation fault on Python 3.12 and 3.13."""
     write_exr(tmp_path / "a.exr", planes(300, 200))
-    code = ("import os, pathlib, sys; os.cpu_count = lambda: 4; from onespp.render.files.exr import read_exr; "
+    code = ("import os, pathlib, sys; os.cpu_count = lambda: 4; "
+            "from onespp.render.files.exr import read_exr; "
             "from concurrent.futures import ThreadPoolExecutor as Pool; "
             "path = pathlib.Path(sys.argv[1]); stdout = sys.stdout; "
             "list(Pool(3).map(lambda _: read_exr(path), range(100))); "
@@ -95,7 +96,7 @@ def test_what_is_read_cannot_be_written_to(tmp_path):
 
 
 def test_equal_input_gives_equal_bytes_in_every_process_and_with_one_core(tmp_path):
-    code = ("import sys, pathlib; sys.path.insert(0, 'tests'); from test_exr import *; "
+    code = ("import sys, pathlib; from tests.render.files.test_exr import *; "
             "write_exr(pathlib.Path(sys.argv[1]), planes(300, 200), {'scene': 'box'})")
     for name, cores in (("a", None), ("b", {min(os.sched_getaffinity(0))} if hasattr(
             os, "sched_getaffinity") else None)):

@@ -16,7 +16,7 @@ from onespp.render.files.exr import read_header
 from onespp.render.files.frame_ranges import format_frames, parse_frames
 from onespp.render.files.manifest import Manifest, Run
 from onespp.render.files.matrices import format_matrices, read_matrices
-from onespp.render.files.sequence import Reference, Sequence
+from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.frame import Frame
 from tests.support.small_sequence import (
     HEIGHT,
@@ -31,7 +31,7 @@ from tests.support.small_sequence import (
 
 def test_a_frame_comes_back_exactly_and_albedo_to_half(tmp_path):
     sequence = small_sequence(tmp_path / "s")
-    frame, back = small_frame(1), Sequence.open(tmp_path / "s").read_frame(1)
+    frame, back = small_frame(1), FrameSequence.open(tmp_path / "s").read_frame(1)
     for name, image in frame.images.items():
         assert back[name].dtype == image.dtype
         assert back[name].shape == image.shape
@@ -113,8 +113,8 @@ def test_the_manifest_reads_back_as_written(tmp_path):
     manifest = small_manifest(
         frames=(0, 1, 2, 7), reference_spp=64, about="two\nlines", fps=29.97, max_depth=6,
         device="llvm", versions={"onespp": "0.1.0"}, created="2025-01-01T00:00:00+00:00")
-    Sequence.create(tmp_path / "s", manifest)
-    assert Sequence.open(tmp_path / "s").manifest == manifest
+    FrameSequence.create(tmp_path / "s", manifest)
+    assert FrameSequence.open(tmp_path / "s").manifest == manifest
     assert json.loads((tmp_path / "s/manifest.json").read_text())["frames"] == "0:3,7"
 
 
@@ -162,7 +162,7 @@ def test_partial_references_come_back_and_go(tmp_path):
 def test_the_same_sequence_is_continued_and_keeps_its_files(tmp_path):
     small_sequence(tmp_path / "s")
     before = contents(tmp_path / "s")
-    sequence = Sequence.create(tmp_path / "s", small_manifest(
+    sequence = FrameSequence.create(tmp_path / "s", small_manifest(
         frames=(0, 1), device="cuda", versions={"onespp": "9"}, created="later", about="other"))
     assert contents(tmp_path / "s") == before
     assert sequence.has_frame(0)
@@ -179,20 +179,20 @@ def test_a_frame_counts_only_with_images_and_matrices(tmp_path):
 
 def test_frames_and_a_reference_can_be_added_later(tmp_path):
     small_sequence(tmp_path / "s", (2, 3))
-    grown = Sequence.create(tmp_path / "s", small_manifest(
+    grown = FrameSequence.create(tmp_path / "s", small_manifest(
         frames=(3, 4, 9), reference_spp=16, reference_filter="box"))
     assert grown.frames == [2, 3, 4, 9]
-    assert Sequence.open(tmp_path / "s").manifest == grown.manifest
+    assert FrameSequence.open(tmp_path / "s").manifest == grown.manifest
     assert grown.manifest.reference_spp == 16
-    same = Sequence.create(tmp_path / "s", small_manifest(frames=(2,)))
+    same = FrameSequence.create(tmp_path / "s", small_manifest(frames=(2,)))
     assert same.frames == [2, 3, 4, 9]
     assert same.manifest.reference_spp == 16
     assert same.manifest.reference_filter == "box"
-    more = Sequence.create(tmp_path / "s", small_manifest(
+    more = FrameSequence.create(tmp_path / "s", small_manifest(
         frames=(2,), reference_spp=64, reference_filter="box"))
     assert more.manifest.reference_spp == 64
     with pytest.raises(InputError, match="another reference_filter"):
-        Sequence.create(tmp_path / "s", small_manifest(reference_spp=64))
+        FrameSequence.create(tmp_path / "s", small_manifest(reference_spp=64))
 
 
 @pytest.mark.parametrize(("change", "words"), [
@@ -208,7 +208,7 @@ def test_another_sequence_is_not_continued_and_the_difference_is_named(tmp_path,
     small_sequence(tmp_path / "s")
     before = contents(tmp_path / "s")
     with pytest.raises(InputError) as error:
-        Sequence.create(tmp_path / "s", small_manifest(**change))
+        FrameSequence.create(tmp_path / "s", small_manifest(**change))
     assert words in str(error.value)
     assert "--overwrite" in str(error.value)
     assert contents(tmp_path / "s") == before
@@ -229,9 +229,9 @@ def test_overwriting_removes_the_sequence_and_nothing_else(tmp_path):
         path = tmp_path / "s" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("x")
-    Sequence.create(tmp_path / "s", small_manifest(seed=8), overwrite=True)
+    FrameSequence.create(tmp_path / "s", small_manifest(seed=8), overwrite=True)
     assert set(contents(tmp_path / "s")) == foreign | {"manifest.json"}
-    assert Sequence.open(tmp_path / "s").manifest.seed == 8
+    assert FrameSequence.open(tmp_path / "s").manifest.seed == 8
     assert not (tmp_path / "s/reference").exists()
 
 
@@ -239,8 +239,8 @@ def test_overwriting_does_not_need_a_readable_manifest(tmp_path):
     small_sequence(tmp_path / "s")
     (tmp_path / "s/manifest.json").write_text("{")
     with pytest.raises(InputError, match="not valid JSON"):
-        Sequence.create(tmp_path / "s", small_manifest())
-    fresh = Sequence.create(tmp_path / "s", small_manifest(), overwrite=True)
+        FrameSequence.create(tmp_path / "s", small_manifest())
+    fresh = FrameSequence.create(tmp_path / "s", small_manifest(), overwrite=True)
     assert set(contents(tmp_path / "s")) == {"manifest.json"}
     assert not fresh.has_frame(0)
 
@@ -249,15 +249,15 @@ def test_overwriting_does_not_need_a_readable_manifest(tmp_path):
 def test_a_folder_with_other_files_is_left_alone(tmp_path, overwrite):
     (tmp_path / "thesis.tex").write_text("x")
     with pytest.raises(InputError, match="holds files that are no sequence"):
-        Sequence.create(tmp_path, small_manifest(), overwrite)
+        FrameSequence.create(tmp_path, small_manifest(), overwrite)
     with pytest.raises(InputError, match="is a file"):
-        Sequence.create(tmp_path / "thesis.tex", small_manifest(), overwrite)
+        FrameSequence.create(tmp_path / "thesis.tex", small_manifest(), overwrite)
     assert os.listdir(tmp_path) == ["thesis.tex"]
 
 
 def test_an_empty_folder_can_be_used(tmp_path):
     (tmp_path / ".DS_Store").write_text("x")
-    assert Sequence.create(tmp_path, small_manifest()).size == (HEIGHT, WIDTH)
+    assert FrameSequence.create(tmp_path, small_manifest()).size == (HEIGHT, WIDTH)
 
 
 @pytest.mark.parametrize(("act", "words"), [
@@ -298,7 +298,7 @@ def test_equal_frames_are_equal_bytes(tmp_path):
 def test_opening_what_is_no_sequence_says_how_to_make_one(tmp_path):
     for folder in (tmp_path, tmp_path / "missing"):
         with pytest.raises(InputError, match="onespp render"):
-            Sequence.open(folder)
+            FrameSequence.open(folder)
 
 
 def test_a_manifest_of_the_python_side_takes_any_list_of_frames():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from onespp.render.errors import InputError
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.frame import Frame
 from onespp.render.games202.conventions import check_frame, check_motion
 from onespp.render.games202.convert import export_games202, import_games202
@@ -26,7 +26,7 @@ def made(**changes) -> Frame:
 
 
 @pytest.fixture(scope="module")
-def real(games202, tmp_path_factory) -> Sequence:
+def real(games202, tmp_path_factory) -> FrameSequence:
     return import_games202(games202, tmp_path_factory.mktemp("real") / "s")
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from onespp.render.errors import InputError
 from onespp.render.files.exr import read_exr, write_exr
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.frame import Frame
 from onespp.render.games202.convert import (
     export_games202,
@@ -86,7 +86,7 @@ def test_the_real_frames_survive_import_and_export_bit_for_bit(games202, tmp_pat
     assert sequence.manifest.source == "games202"
     assert sequence.size == (512, 512)
     assert len(sequence.manifest.objects) == 7
-    export_games202(Sequence.open(tmp_path / "s"), tmp_path / "out")
+    export_games202(FrameSequence.open(tmp_path / "s"), tmp_path / "out")
     assert_same_layout(games202 / "input", tmp_path / "out", 4)
 
 
@@ -105,7 +105,7 @@ def test_on_real_frames_the_screen_is_where_we_say_it_is(games202, tmp_path):
             camera, (int((~seen).sum()), 3)), atol=1e-6)
 
 
-def exported(tmp_path: Path) -> tuple[Sequence, Path]:
+def exported(tmp_path: Path) -> tuple[FrameSequence, Path]:
     sequence = small_sequence(tmp_path / "ours", (3, 7))
     export_games202(sequence, tmp_path / "layout")
     return sequence, tmp_path / "layout"

@@ -15,7 +15,7 @@ from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
 from onespp.render.files.exr import write_exr
 from onespp.render.files.manifest import Manifest
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.games202.convert import RESULTS, export_games202, import_games202
 from onespp.render.games202.layout import gaps
 from tests.support.frames import make_frame, noisy, translation
@@ -41,13 +41,13 @@ def box(tmp_path):
     return tmp_path / "box"
 
 
-def taken(folder: Path, out: Path) -> tuple[Sequence, list[str]]:
+def taken(folder: Path, out: Path) -> tuple[FrameSequence, list[str]]:
     notes: list[str] = []
     return import_games202(folder, out, tell=notes.append), notes
 
 
 def test_a_folder_that_holds_input_is_taken_whole(box, tmp_path):
-    ours = Sequence.open(tmp_path / "ours")
+    ours = FrameSequence.open(tmp_path / "ours")
     sequence, notes = taken(box, tmp_path / "s")
     assert sequence.manifest.scene == "box"
     assert sequence.frames == [0, 1, 2]
@@ -139,7 +139,7 @@ def test_the_manifest_claims_nothing_that_nobody_knows(box, tmp_path):
     assert {key: data[key] for key in unknown} == dict.fromkeys(unknown)
     path.write_text(json.dumps(data | {"spp": 1, "direct": "mis", "sampler": "pcg",
                                        "reference_filter": "centre"}))  # of an older version
-    assert Sequence.open(sequence.folder).manifest == sequence.manifest
+    assert FrameSequence.open(sequence.folder).manifest == sequence.manifest
     taken(box, tmp_path / "s")  # and goes on
     rendered = Manifest(scene="a", frames=(0,), width=1, height=1, channels=("color",),
                         objects=("a",))
@@ -205,7 +205,7 @@ def test_history_is_carried_over_a_gap_by_the_matrices(name):
 def test_import_can_overwrite_as_its_message_says(call, box, tmp_path):
     out = tmp_path / "s"
     assert call("import", box, "--out", out, "--fps", 12)[0] == 0
-    assert Sequence.open(out).manifest.fps == 12
+    assert FrameSequence.open(out).manifest.fps == 12
     write(box / "input/beauty_1.exr", np.ones((HEIGHT, WIDTH, 3), np.float32))
     code, _, error = call("import", box, "--out", out, "--fps", 12)
     assert code == 2
@@ -214,7 +214,7 @@ def test_import_can_overwrite_as_its_message_says(call, box, tmp_path):
     assert code == 0, error
     assert "imported 3 frames" in text
     assert "took 3 references" in text
-    assert (Sequence.open(out).read_frame(1)["color"] == 1).all()
+    assert (FrameSequence.open(out).read_frame(1)["color"] == 1).all()
 
 
 def test_import_refuses_other_conventions_and_takes_them_if_told(call, box, tmp_path):

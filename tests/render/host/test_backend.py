@@ -50,11 +50,11 @@ def test_a_wrong_llvm_path_is_refused_in_a_sentence(make, tmp_path):
 
 @pytest.mark.skipif(not OLD, reason="no libLLVM older than 16 on this machine")
 def test_importing_drjit_first_with_an_old_llvm_is_an_error_not_an_abort():
-    code = "import drjit, drjit.llvm as l; l.Float([1, 2]) + 1\nimport render"
+    code = "import drjit, drjit.llvm as l; l.Float([1, 2]) + 1\nimport onespp.render"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False,
                           env=os.environ | {"DRJIT_LIBLLVM_PATH": str(OLD[-1])})
     assert done.returncode == 1
-    assert "import render or denoise before drjit" in done.stderr
+    assert "import onespp.render before drjit" in done.stderr
 
 
 def test_doctor_names_a_wrong_llvm_and_survives(tmp_path):
@@ -128,5 +128,6 @@ def test_odd_sizes_are_refused(text):
 
 
 def test_denoise_imports_no_renderer():
-    code = "import sys, onespp.denoise.run.sequence, onespp.denoise.score.sequence; sys.exit('mitsuba' in sys.modules)"
+    code = ("import sys, onespp.denoise.run.sequence, onespp.denoise.score.sequence; "
+            "sys.exit('mitsuba' in sys.modules)")
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

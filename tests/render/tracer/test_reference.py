@@ -10,10 +10,10 @@ import pytest
 import onespp.render.job
 import onespp.render.tracer.reference
 from onespp.render.errors import InputError
-from onespp.render.files.sequence import Sequence
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.job import RenderJob, render_sequence
 from onespp.render.mitsuba.variant import mi
-from onespp.render.tracer.reference import Progress, pass_sizes, render_reference
+from onespp.render.tracer.reference import SampleSums, pass_sizes, render_reference
 from onespp.render.tracer.renderer import Renderer
 from onespp.render.tracer.sampler import Sobol, keys_from_seed
 from tests.support.furnace import furnace
@@ -50,7 +50,7 @@ def test_uneven_passes_estimate_the_same_variance():
     sizes = pass_sizes(37)
     stated, means = [], []
     for _ in range(3000):
-        progress = Progress.start(1, 1)
+        progress = SampleSums.start(1, 1)
         for n in sizes:
             progress.add(rng.normal(2.0, 3.0, (n, 1, 1, 3)).sum(0), n)
         reference = progress.reference()
@@ -98,7 +98,7 @@ def test_an_interrupted_reference_goes_on_to_the_same_bytes(tmp_path, monkeypatc
     monkeypatch.setattr(Renderer, "sample_sum", interrupted)
     with pytest.raises(KeyboardInterrupt):
         render_sequence(job, tmp_path / "stopped")
-    stopped = Sequence.open(tmp_path / "stopped")
+    stopped = FrameSequence.open(tmp_path / "stopped")
     assert stopped.has_reference(0)
     assert not stopped.has_reference(1)
     assert stopped.read_partial(1) is not None
@@ -144,12 +144,12 @@ def test_a_better_reference_is_kept_and_said(tmp_path, call):
     assert text.splitlines()[0] == ("kept 2 references of 24 spp, better than the 16 spp asked for "
                                     "(--overwrite replaces them)")
     assert {p: t for p, t in files(out).items() if p in before} == before
-    sequence = Sequence.open(out)
+    sequence = FrameSequence.open(out)
     assert [sequence.reference_spp(i) for i in range(3)] == [24, 24, 16]
     assert sequence.manifest.reference_spp == 16  # the fewest, which is what holds for all
     code, text, _ = call(*command, "--frames", "2", "--reference-spp", 24)
     assert (code, "kept" in text) == (0, False)
-    assert Sequence.open(out).manifest.reference_spp == 24
+    assert FrameSequence.open(out).manifest.reference_spp == 24
 
 
 def test_the_default_of_run_keeps_a_better_reference_too(tmp_path, call):
@@ -204,7 +204,7 @@ def test_what_an_interrupt_left_of_a_better_reference_is_used(tmp_path, monkeypa
     found = render_sequence(job, tmp_path / "a").read_reference(0)
     assert (found.spp, len(passes) - 6) == (spp, traced)
     monkeypatch.setattr(Renderer, "sample_sum", real)
-    progress, sizes = Progress.start(SIZE, SIZE), [4] * 5 if asked == 16 else pass_sizes(spp)
+    progress, sizes = SampleSums.start(SIZE, SIZE), [4] * 5 if asked == 16 else pass_sizes(spp)
     renderer = Renderer(scene, SIZE, SIZE)
     for number, size in enumerate(sizes):
         progress.add(renderer.sample_sum(0, 0, number, size), size)

@@ -151,8 +151,8 @@ def test_the_command_adds_them(tmp_path, call):
     base = ("render", "box", "--frames", "0:2", "--size", "12x9", "--out", out)
     code, _, _ = call(*base, "--channels", "+gradient")
     assert code == 0
-    from onespp.render.files.sequence import Sequence
-    sequence = Sequence.open(out)
+    from onespp.render.files.sequence import FrameSequence
+    sequence = FrameSequence.open(out)
     assert sequence.manifest.channels[-2:] == REPLAY
     assert (sequence.read_frame(0)["replay"] == -1).all()
     assert (sequence.read_frame(1)["replay"] >= 0).any()

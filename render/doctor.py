@@ -12,11 +12,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from onespp.render.errors import InputError
-from onespp.render.trials import TRIALS, Trial, TrialError, attempt
+from onespp.render.host.memory import BASE_BYTES, BYTES_PER_PIXEL, free_memory
 
-from . import backend
-from .memory import BASE_BYTES, BYTES_PER_PIXEL, free_memory
+from .errors import InputError
+from .host import backend
+from .trials import TRIALS, Trial, TrialError, attempt
 
 PACKAGES = ("mitsuba", "drjit", "OpenEXR", "numpy")
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from onespp.denoise.oracles import filters as oracles
-from onespp.denoise.oracles.filters import Pixels, blur3x3, luminance, pairs
 from onespp.render.frame import Frame
+
+from . import filters as oracles
+from .filters import Pixels, blur3x3, luminance, pairs
 
 
 def depth_slope(frame: Frame) -> np.ndarray:

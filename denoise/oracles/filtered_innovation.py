@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from onespp.denoise.oracles import filters as oracles
-from onespp.denoise.oracles.filters import (
-    Pixels,
-    luminance,
-    pairs,
-    plane_weight_distance,
-    reproject_bilinear,
-)
 from onespp.render.frame import Frame
+
+from . import filters as oracles
+from .filters import Pixels, luminance, pairs, plane_weight_distance, reproject_bilinear
 
 H = {0: 1 / 2, 1: 1 / 4}
 
@@ -155,7 +152,7 @@ def spatial_variance(frame: Frame, signal: np.ndarray, m) -> np.ndarray:
 def look_up(previous: Frame, frame: Frame, image: np.ndarray, m) -> tuple:
     """History, 0 where there is none, and where there is one."""
     history = reproject_bilinear(previous, frame, image, m.min_cosine, m.plane_tolerance)
-    found = np.isfinite(history).all(-1)
+    found = np.asarray(np.isfinite(history).all(-1))
     return np.where(found[..., None], history, 0), found
 
 
@@ -167,7 +164,7 @@ def shadow_shift(previous: Frame, frame: Frame) -> np.ndarray:
     h, w = frame["id"].shape
     shift = np.full((h, w, 2), np.nan)
 
-    def seen(surface: int, object_: int, point: np.ndarray) -> np.ndarray:
+    def seen(surface: Any, object_: Any, point: np.ndarray) -> np.ndarray:
         """Where a point of an object was in the frame before, as the surface saw it."""
         motion = np.eye(4)
         for i, back in ((object_, True), (surface, False)):

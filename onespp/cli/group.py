@@ -1,0 +1,38 @@
+"""The command line: scene, frame, file, denoiser, score."""
+
+from __future__ import annotations
+
+import click
+
+from onespp.denoise.cli.ablate import ablate
+from onespp.denoise.cli.bench import bench
+from onespp.denoise.cli.compare import compare
+from onespp.denoise.cli.denoise import denoise
+from onespp.denoise.cli.lead import lead
+from onespp.denoise.cli.report import report
+from onespp.denoise.cli.score import score
+from onespp.denoise.cli.time import time_
+from onespp.denoise.cli.tune import tune
+from onespp.render.cli.render import export, import_, render
+from onespp.render.cli.terminal import run as run_command
+
+from .doctor import doctor
+from .hard import hard
+from .run import run
+from .scenes import scenes
+
+
+@click.group()
+@click.version_option(package_name="onespp")
+def app() -> None:
+    """Render animations at one sample per pixel, denoise them, score the result."""
+
+
+for command in (scenes, render, denoise, time_, score, run, report, compare, bench, tune, ablate,
+                lead, hard, import_, export, doctor):
+    app.add_command(command)
+
+
+def main() -> None:
+    """Entry point of the console command."""
+    run_command(app)

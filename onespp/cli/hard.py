@@ -1,0 +1,72 @@
+"""The command `hard`: every method on scenes that break denoisers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import click
+
+from onespp.render.cli.options import device_option, threads_option, use
+from onespp.render.cli.terminal import Steps, progress
+
+from .run import REFERENCE_SPP
+
+
+@click.command()
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", default=Path("data/hard"),
+              show_default=True, help="Folder of the sequences.")
+@click.option("--reference-spp", type=int, default=REFERENCE_SPP, show_default=True, metavar="N",
+              help="Samples a pixel of the ground truth.")
+@device_option
+@threads_option
+def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
+         threads: int | None) -> None:
+    """Try every method on hard scenes (all, or those named), and print a table in Markdown.
+
+    Renders what is missing. For each scene and method: error, what its history gains, how soon it
+    recovers from a sudden change, and whether it keeps the energy.
+    """
+    use(device, threads)
+    from onespp.denoise.studies.hard_scenes import markdown
+    from onespp.scenes import catalog
+    from onespp.scenes.hard import HARD
+
+    unknown = [name for name in names if name not in HARD]
+    if unknown:
+        catalog.load(f"hard/{unknown[0]}")  # says what there is
+    rows = []
+    with progress() as begin:
+        steps = begin("hard scenes", len(names or HARD))
+        for number, name in enumerate(names or HARD):
+            rows += _judge_hard(name, out, reference_spp, partial(_within, steps, number, name))
+    click.echo(markdown(rows))
+
+
+def _judge_hard(name: str, out: Path, reference_spp: int, advance: Callable[[float], None]) -> list:
+    """Rows of one hard scene; `advance` is told the share that is done."""
+    from onespp.denoise.catalog import METHODS
+    from onespp.denoise.studies.hard_scenes import judge
+    from onespp.render.job import RenderJob, kept_references, render_sequence
+    from onespp.scenes.hard import HARD
+
+    hard = HARD[name]
+    scene = hard.make()
+    job = RenderJob(scene, range(scene.frames), scene.height, scene.width,
+                    reference_spp=reference_spp)
+    needed = {channel for method in METHODS.values() for channel in method.needs}
+    job = replace(job, channels=tuple(dict.fromkeys((*job.channel_names(), *sorted(needed)))))
+    sequence = render_sequence(job, out / name, on_references=lambda done, _: advance(
+        0.5 * done / scene.frames))
+    if kept := kept_references(sequence, sequence.frames, reference_spp):
+        click.echo(f"{name}: {kept}", err=True)
+    judged = iter(range(1, len(METHODS) + 2))
+    return judge(sequence, name, hard.event, hard.diffuse,
+                 lambda: advance(0.5 + 0.5 * next(judged) / (len(METHODS) + 1)))
+
+
+def _within(steps: Steps, number: int, name: str, part: float) -> None:
+    steps.advance(number + part, name)

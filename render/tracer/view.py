@@ -1,0 +1,59 @@
+"""A scene at one size: what rendering a frame and replaying samples of the last one both need."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from onespp.render.errors import InputError
+from onespp.render.mitsuba.scene import MitsubaScene
+from onespp.render.mitsuba.variant import mi
+from onespp.scenes.description import Scene
+
+from .camera_rays import PixelRays, pixel_rays
+from .sampler import BlueNoise, Keys, Pcg, Sampler, Sobol, z_order
+
+DIRECT = ("mis", "resampled")
+SAMPLERS: dict[str, Callable[[Keys, Any, int], Sampler]] = {
+    "pcg": lambda keys, pixel, width: Pcg(keys, pixel),
+    "zsobol": lambda keys, pixel, width: Sobol(keys, mi.UInt32(0),
+                                               z_order(pixel % width, pixel // width)),
+    "bluenoise": lambda keys, pixel, width: BlueNoise(keys, pixel % width, pixel // width),
+}
+
+
+class View:
+    """A scene, its live Mitsuba scene, the size of its images and the estimator of its light.
+
+    Attributes:
+        scene, stage: the description, and what Mitsuba made of it. height, width: pixels.
+        direct: one of `DIRECT`. sampler: one of `SAMPLERS`.
+
+    Raises:
+        InputError: a size below 1x1, or an unknown `direct` or `sampler`.
+        SceneError: a scene that Mitsuba cannot build.
+    """
+
+    def __init__(self, scene: Scene, height: int, width: int, direct: str = "mis",
+                 sampler: str = "pcg") -> None:
+        for option, value, known in (("direct", direct, DIRECT), ("sampler", sampler, SAMPLERS)):
+            if value not in known:
+                raise InputError(f"unknown --{option} '{value}': use {' or '.join(known)}")
+        self.direct, self.sampler = direct, sampler
+        if height < 1 or width < 1:
+            raise InputError(f"the size {width}x{height} is empty: use at least 1x1")
+        self.scene, self.height, self.width = scene, height, width
+        self.stage = MitsubaScene(scene)
+
+    def rays(self) -> PixelRays:
+        """Rays through points of the image, at the frame that the stage is set to."""
+        return pixel_rays(self.stage, self.height, self.width)
+
+    def new_sampler(self, keys: Keys, pixel: mi.UInt32) -> Sampler:
+        """The random numbers of pixels."""
+        return SAMPLERS[self.sampler](keys, pixel, self.width)
+
+    def centres(self, pixel: mi.UInt32) -> tuple[mi.Float, mi.Float]:
+        """Screen coordinates (x, y) of pixels' centres, by index."""
+        row = pixel // self.width
+        return mi.Float(pixel - row * self.width) + 0.5, mi.Float(row) + 0.5
