@@ -65,8 +65,8 @@ class Mesh:
         normals: (n, 3) for smooth shading, None for flat. uv: (n, 2) or None.
 
     Raises:
-        SceneError: shapes disagree, there is no face, something is not finite, or a face names
-            a vertex that is not there.
+        SceneError: shapes disagree, there is no face, something is not finite, a normal has no
+            length, or a face names a vertex that is not there.
     """
 
     vertices: np.ndarray
@@ -103,6 +103,13 @@ class Mesh:
             odd = faces.min() if faces.min() < 0 else faces.max()
             raise SceneError(f"mesh faces use vertex {odd}, but there are {n} vertices, "
                              "numbered from 0")
+        if self.normals is not None:
+            used = np.unique(faces)
+            without = used[~np.any(self.normals[used], axis=1)]
+            if without.size:  # Mitsuba shades what surrounds them with NaN, which shows as black
+                raise SceneError(f"mesh normals have no length at {without.size} of {used.size} "
+                                 f"vertices, such as {without[0]}: give each a direction, or leave "
+                                 "normals out")
         object.__setattr__(self, "faces", faces.astype(np.uint32))
 
 
@@ -131,7 +138,9 @@ class Shape:
 
     def __post_init__(self) -> None:
         validity.text(self.name, "the name of a shape", 200)
-        if not isinstance(self.geometry, Geometry):
+        # Renderers ask for the type itself: what inherits from a Sphere is drawn by nobody.
+        if not (isinstance(self.geometry, Mesh)
+                or type(self.geometry) in (Sphere, Rectangle, Disk, Cylinder)):
             raise SceneError(f"the geometry of shape '{self.name}' is "
                              f"{validity.brief(self.geometry)}: use Sphere(), Rectangle(), Disk(), "
                              "Cylinder() or a Mesh")
@@ -278,14 +287,19 @@ class Scene:
         """Ask for everything that changes in each of these frames, so that a mistake shows now.
 
         Raises:
-            SceneError: something is not there, or is not what it may be.
+            SceneError: something is not there, is not what it may be, or differs when asked twice.
         """
-        moving = [shape for shape in self.shapes if shape.moves or callable(shape.emission)]
+        changing: list[tuple[str, Callable[[float], Any]]] = [
+            *[("the place of 'camera'", self.camera.world_from_camera_at)] * self.camera.moves,
+            *((f"the place of '{s.name}'", s.world_from_object_at) for s in self.shapes if s.moves),
+            *((f"the emission of '{s.name}'", s.emission_at) for s in self.shapes
+              if callable(s.emission))]
         for frame in frames:
-            self.camera.world_from_camera_at(frame)
-            for shape in moving:
-                shape.world_from_object_at(frame)
-                shape.emission_at(frame)
+            for what, at in changing:
+                if not np.array_equal(at(frame), at(frame)):  # as of a random number, or a counter
+                    raise SceneError(f"{what} is not the same when frame {frame:g} is asked for "
+                                     "twice: let it depend on the frame's number alone (a random "
+                                     "one on a seed)")
 
     @property
     def object_names(self) -> tuple[str, ...]:
@@ -305,5 +319,5 @@ def _called(function: Callable[[float], Any], frame: float, what: str) -> Any:
         return function(frame)
     except (SceneError, MemoryError):
         raise
-    except Exception as error:  # the author's own code may raise anything
+    except (Exception, SystemExit, GeneratorExit) as error:  # the author's code may raise anything
         raise SceneError(f"{what} raises {validity.said(error)}") from error

@@ -4,7 +4,8 @@ While the file runs, and only then,
 - it can import the files beside it. Their folder is searched last, so that a neighbour called
   `render.py` or `numpy.py` takes nothing from the library or from Python; what was imported from
   there is forgotten afterwards, and two scenes' `parts.py` do not meet;
-- the search path and the working directory are its own: both are put back.
+- the search path and the working directory are its own: both are put back;
+- `scenes` means `onespp.scenes`, as it did before that was the package's name (for one version).
 
 A file name in the scene ("filename" in a material, the path of an environment) is looked up from
 the folder of the scene's file, whatever the working directory is.
@@ -12,10 +13,13 @@ the folder of the scene's file, whatever the working directory is.
 
 from __future__ import annotations
 
+import ast
 import importlib
 import os
+import pkgutil
 import sys
 import traceback
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -44,7 +48,7 @@ def load_file(path: Path) -> Scene:
         raise SceneError(f"there is no scene file {shown}")
     whole = path.absolute()
     try:
-        with _neighbours(whole.parent):
+        with _neighbours(whole.parent), _old_names(whole):
             scene = _checked(_run(whole))
         return _found_from(scene, whole.parent)
     except (KeyboardInterrupt, MemoryError):
@@ -84,6 +88,40 @@ def _neighbours(folder: Path) -> Iterator[None]:
                 del sys.modules[name]
         if here is not None:
             os.chdir(here)
+
+
+@contextmanager
+def _old_names(path: Path) -> Iterator[None]:
+    """`import scenes` finds `onespp.scenes`, unless there is a neighbour of that name."""
+    if not _imports_old_names(path):
+        yield
+        return
+    warnings.warn(f"{path.name} imports `scenes`: write `onespp.scenes`, the old name goes with "
+                  "the next version", FutureWarning, stacklevel=5)
+    package = importlib.import_module("onespp.scenes")
+    names = ["onespp.scenes", *(found.name for found in pkgutil.walk_packages(
+        package.__path__, "onespp.scenes."))]
+    old = {name.removeprefix("onespp."): importlib.import_module(name) for name in names}
+    before = {name: sys.modules[name] for name in old if name in sys.modules}
+    sys.modules.update(old)
+    try:
+        yield
+    finally:
+        for name in old:
+            sys.modules.pop(name, None)
+        sys.modules.update(before)
+
+
+def _imports_old_names(path: Path) -> bool:
+    if (path.parent / "scenes.py").exists() or (path.parent / "scenes").is_dir():
+        return False
+    try:
+        nodes = list(ast.walk(ast.parse(path.read_bytes())))
+    except (SyntaxError, ValueError):  # told when it is run
+        return False
+    named = [node.module for node in nodes if isinstance(node, ast.ImportFrom) and not node.level]
+    named += [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+    return any((name or "").split(".")[0] == "scenes" for name in named)
 
 
 def _working_directory() -> str | None:

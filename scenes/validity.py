@@ -23,14 +23,17 @@ Bounds = tuple[float, float]
 ANY: Bounds = (-math.inf, math.inf)
 FRACTION: Bounds = (0.0, 1.0)
 POSITIVE: Bounds = (0.0, math.inf)
+REFRACTION: Bounds = (0.1, 10.0)
+RADIANCE: Bounds = (0.0, 1e12)  # 500 times the sun's in cd/m^2; its square is far from overflow
 
 # Properties of Mitsuba's BSDFs that are fractions, whether numbers, colours or textures.
 _FRACTIONS = frozenset((
     "reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance",
     "transmittance", "base_color", "opacity", "weight", "roughness", "metallic", "anisotropic",
     "spec_tint", "spec_trans", "sheen", "sheen_tint", "clearcoat", "clearcoat_gloss", "flatness"))
-_NOT_NEGATIVE = frozenset(("alpha", "alpha_u", "alpha_v", "eta", "k", "int_ior", "ext_ior",
-                           "specular", "diff_trans"))
+_NOT_NEGATIVE = frozenset(("alpha", "alpha_u", "alpha_v", "eta", "k", "specular",
+                           "diff_trans"))
+_INDICES = frozenset(("int_ior", "ext_ior"))  # one is divided by the other
 _OF_A_TEXTURE = frozenset(("bitmap", "color0", "color1", "value"))  # as its property is bounded
 PLACEMENTS = ("uv_from_surface", "to_uv")
 _DEEPEST = 16
@@ -176,10 +179,10 @@ def emission(value: Any, what: str) -> tuple[float, float, float] | np.ndarray |
         if value.get("type") == "area" and set(value) == {"type", "radiance"}:
             return emission(value["radiance"], what)
         if value.get("type") == "rgb":
-            return color(value.get("value"), what)
+            return color(value.get("value"), what, RADIANCE)
         # A checkerboard's colours are reflectances for Mitsuba, whatever it is used for.
         _check_plugin(value, Place(what),
-                      FRACTION if value.get("type") == "checkerboard" else POSITIVE, 0)
+                      FRACTION if value.get("type") == "checkerboard" else RADIANCE, 0)
         return value
     return _radiance(value, what)
 
@@ -205,11 +208,11 @@ def environment(value: Any, what: str) -> tuple[float, float, float] | np.ndarra
 
 def _radiance(value: Any, what: str) -> tuple[float, float, float] | np.ndarray:
     if np.ndim(_array(value, what)) == 0:
-        gray = number(value, what, POSITIVE)
+        gray = number(value, what, RADIANCE)
         return gray, gray, gray
     if np.ndim(value) == 1:
-        return color(value, what)
-    return image(value, what)
+        return color(value, what, RADIANCE)
+    return image(value, what, RADIANCE)
 
 
 def _check_plugin(plugin: Mapping[Any, Any], place: Place, bounds: Bounds, depth: int) -> None:
@@ -230,6 +233,8 @@ def bounds_of(key: str, inherited: Bounds) -> Bounds:
     """What a property of a BSDF, or of a texture with inherited bounds, may be."""
     if key in _OF_A_TEXTURE:
         return inherited
+    if key in _INDICES:
+        return REFRACTION
     return FRACTION if key in _FRACTIONS else POSITIVE if key in _NOT_NEGATIVE else ANY
 
 
@@ -303,7 +308,7 @@ def _within(found: np.ndarray, what: str, bounds: Bounds) -> np.ndarray:
     if least < low - _ROUNDING or most > high + _ROUNDING:
         odd = least if least < low - _ROUNDING else most
         helper = " (8-bit colours become linear with onespp.scenes.materials.srgb8)"
-        hint = helper if most > 1 else ""
+        hint = helper if most > 1 == high else ""
         use = f"{low:g} to {high:g}{hint}" if high < math.inf else f"{low:g} or more"
         raise SceneError(f"{what} {'is' if found.ndim == 0 else 'holds'} {odd:.6g}: use {use}")
     return np.clip(found, low, high)

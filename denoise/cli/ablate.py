@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import progress
 from onespp.render.files.sequence import FrameSequence
@@ -20,7 +21,6 @@ from onespp.render.files.sequence import FrameSequence
 def ablate(folders: tuple[Path, ...], method: str, device: str, threads: int | None) -> None:
     """Print what each part of a method is worth on the sequences in DIR, as Markdown."""
     use(device, threads)
-    from onespp.denoise.metrics.tonemap import TONE_MAP
     from onespp.denoise.studies.ablation import ablate as ablate_sequence
     from onespp.denoise.studies.ablation import markdown, variants
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -73,9 +73,7 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
     denoisers = {method + (OUTLIERS if outliers is not None else "") if name is None else name:
                  build(method, pairs(settings), outliers, note) for method in chosen}
     for name, denoiser in denoisers.items():
-        if set(REPLAY) & set(denoiser.needs) - set(sequence.manifest.channels):
-            raise InputError(f"{name} needs the channels {' and '.join(REPLAY)}, which {folder} "
-                             "lacks: render it with --channels +gradient")
+        _check_replay(name, denoiser.needs, sequence.manifest.channels, str(folder))
     frames = sum(map(sequence.has_frame, sequence.frames))
     if not frames:
         raise InputError(f"{folder} has no frames yet: render some first")
@@ -97,6 +95,21 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
         click.echo(line)
     click.echo(f"denoised {frames} frames by {', '.join(runs)} "
                f"into {sequence.folder / 'denoised'}")
+
+
+def check_methods(methods: tuple[str, ...], channels: tuple[str, ...]) -> None:
+    """InputError for methods that `denoise_in` would refuse for frames with these channels asked
+    for: said before hours of rendering."""
+    from onespp.denoise.catalog import build
+
+    for name in _names(methods):
+        _check_replay(name, build(name).needs, channels, "this run")
+
+
+def _check_replay(name: str, needs: Iterable[str], channels: Iterable[str], who: str) -> None:
+    if set(REPLAY) & set(needs) - set(channels):
+        raise InputError(f"{name} needs the channels {' and '.join(REPLAY)}, which {who} "
+                         "lacks: render it with --channels +gradient")
 
 
 def _what_to_know(sequence: FrameSequence, default: bool) -> Iterator[str]:

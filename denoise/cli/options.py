@@ -18,6 +18,6 @@ def show_or_print(text: str, json_to: str | None, show: Callable[[], None]) -> N
     if json_to == "-":
         click.echo(text, nl=False)
         return
-    if json_to:
+    if json_to is not None:
         write_text(Path(json_to), text)
     show()

@@ -49,7 +49,9 @@ class OnLanes(Generic[State]):
         raise NotImplementedError
 
     def __call__(self, frame: Frame, state: State) -> tuple[np.ndarray, State]:
-        """(h, w, 3) denoised colour, nowhere negative, and the state for the next frame.
+        """(h, w, 3) denoised colour, and the state for the next frame.
+
+        Where the input is nowhere negative, neither is the result (`filters/debts.py`).
 
         Raises:
             InputError: a channel is missing, the size is not the state's, or the frame has
@@ -57,7 +59,10 @@ class OnLanes(Generic[State]):
         """
         color, surface = read_color(frame, state.stencil), read_surface(frame, state.stencil)
         result, after = self.on_lanes(frame, color, surface, state)
-        return repay(state.stencil.image(result), frame["id"]), after
+        image = state.stencil.image(result)
+        if not (frame["color"] < 0).any():  # where light is negative, so may a mean of it be
+            repay(image, frame["id"])
+        return image, after
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,
                  state: State) -> tuple[Color, State]:

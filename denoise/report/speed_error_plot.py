@@ -76,8 +76,8 @@ def times_are(in_turns: list[bool]) -> str:
 
 def _style(axes, scores: Scores) -> None:
     width, height = scores.size
-    axes.set_title(f"{scores.scene}: speed against error", loc="left", color=_INK,
-                   fontsize=14, fontweight="bold", pad=24)
+    axes.set_title(f"{scores.scene}: speed against error", loc="left", color=_INK, fontsize=14,
+                   fontweight="bold", pad=24, parse_math=False)  # a scene may be called a$b_$
     spp, reference = (n or "unknown" for n in (scores.spp, scores.reference_spp))
     axes.text(0, 1.02, f"{len(scores.frames)} frames, {width}x{height}, {spp} spp, "
               f"reference {reference} spp", transform=axes.transAxes,

@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
-from onespp.denoise.cli.denoise import DEFAULT_METHODS, denoise_in
+from onespp.denoise.cli.denoise import DEFAULT_METHODS, check_methods, denoise_in
 from onespp.denoise.cli.score import score_in
 from onespp.render.cli.options import render_options, use
-from onespp.render.cli.render import render_to
+from onespp.render.cli.render import channel_names, render_to
 
 REFERENCE_SPP = 256
 
@@ -24,11 +24,14 @@ REFERENCE_SPP = 256
 @render_options
 @click.pass_context
 def run(context: click.Context, scene: str, out: Path | None, methods: tuple[str, ...],
-        device: str, threads: int | None, reference_spp: int | None, **options) -> None:
+        device: str, threads: int | None, reference_spp: int | None, channels: str | None,
+        **options) -> None:
     """Render SCENE with ground truth, denoise it and score the result."""
     use(device, threads)
+    named, added = channel_names(channels)
+    check_methods(methods, (*(named or ()), *added))
     spp = REFERENCE_SPP if reference_spp is None else reference_spp
-    sequence = render_to(scene, out, reference_spp=spp, **options)
+    sequence = render_to(scene, out, reference_spp=spp, channels=channels, **options)
     default = context.get_parameter_source("methods") == ParameterSource.DEFAULT
     denoise_in(sequence.folder, methods, default=default)
     score_in(sequence.folder)

@@ -15,7 +15,7 @@ def parse_size(text: str) -> tuple[int, int]:
     Raises:
         InputError: no such form, a side of 0 or above 16384.
     """
-    match = re.fullmatch(r"(\d{1,9})[xX](\d{1,9})", text.strip())
+    match = re.fullmatch(r"([0-9]{1,9})[xX]([0-9]{1,9})", text.strip())
     if not match:
         raise InputError(f"--size '{text}' is not understood: use WIDTHxHEIGHT, as in 640x360")
     width, height = int(match[1]), int(match[2])

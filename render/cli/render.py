@@ -44,7 +44,7 @@ def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: st
     if seed < 0:
         raise InputError(f"--seed is {seed}: use 0 or more")
     require_memory(height, width)
-    names, added = _channel_names(channels)
+    names, added = channel_names(channels)
     from onespp.render.job import RenderJob, kept_references, render_sequence  # imports Mitsuba
 
     job = RenderJob(scene, numbers, height, width, seed, reference_spp, antialias, names,
@@ -64,7 +64,7 @@ def _ignore(done: float, note: str) -> None:
     pass
 
 
-def _channel_names(text: str | None) -> tuple[tuple[str, ...] | None, tuple[str, ...]]:
+def channel_names(text: str | None) -> tuple[tuple[str, ...] | None, tuple[str, ...]]:
     """The channels asked for, None for the default ones, and those to add to them."""
     if text is None:
         return None, ()

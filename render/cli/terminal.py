@@ -8,6 +8,7 @@ import shlex
 import signal
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any, NoReturn, TextIO
@@ -180,6 +181,7 @@ def _run(command: click.Command, arguments: Sequence[str] | None, name: str) -> 
     from onespp.scenes.description import SceneError
 
     _Stop.asked = _Stop.at_once = False
+    warnings.showwarning = _tell_warning
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _Stop.ask)
     typed = list(sys.argv[1:] if arguments is None else arguments)
@@ -196,6 +198,11 @@ def _run(command: click.Command, arguments: Sequence[str] | None, name: str) -> 
     except MemoryError:
         _stop("there is not enough memory: use a smaller --size, or fewer --channels; what was "
               "finished is kept")
+    except UnicodeEncodeError as error:
+        if error.encoding == "utf-8":
+            raise
+        _stop(f"{error.object!r} holds letters that this locale ({error.encoding}) has not: use "
+              "another name, or a locale of UTF-8, as LC_ALL=C.UTF-8")
     except Exception as error:
         if _Stop.at_once:  # what an interrupt becomes inside an extension's import, say
             _interrupted()
@@ -206,6 +213,17 @@ def _run(command: click.Command, arguments: Sequence[str] | None, name: str) -> 
     finally:  # Python is about to end, and an interrupt would only make it complain
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)
+
+
+_show_warning = warnings.showwarning
+
+
+def _tell_warning(message: Warning | str, category: type[Warning], *where: Any) -> None:
+    """What goes with the next version is told in a line of ours."""
+    if category is FutureWarning:
+        note(str(message))
+    else:
+        _show_warning(message, category, *where)
 
 
 def command_line() -> str:
@@ -222,6 +240,8 @@ _REASONS = {
     errno.EROFS: "the file system is read-only{where}: choose another --out",
     errno.ENOTDIR: "a file is in the way of a folder{where}: choose another --out",
     errno.EISDIR: "a folder is in the way of a file{where}: choose another --out",
+    errno.ENAMETOOLONG: "the name of a file is too long{where}: use a shorter one",
+    errno.ELOOP: "symbolic links lead in a circle{where}: use another folder",
     errno.EFBIG: "a file would be larger than allowed{where}: choose another --out",
     errno.EIO: "the disk reported an error{where}: check it, then run the same command again",
 }

@@ -39,8 +39,12 @@ def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
     Raises:
         InputError: the file system refuses (full, read-only, no permission, not a folder).
     """
+    if not path.name:  # as / and .
+        raise InputError(f"{path} is a folder, and no name for a file: add one")
     temporary = temporary_name(path)
     try:
+        if _is_device(path):  # the rename would put a file in its place, for all who use it
+            raise InputError(f"{path} is a device or a pipe: give the name of a file")
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary.unlink(missing_ok=True)  # a link put there would lead the write elsewhere
         yield temporary
@@ -55,6 +59,15 @@ def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
         # Nothing to remove after a rename; where the folder is out of reach, the error says so.
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def _is_device(path: Path) -> bool:
+    """Whether a name leads to neither a file nor a folder, nor nowhere."""
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 @contextmanager

@@ -7,7 +7,8 @@ frame that keeps to them, to within rounding,
 
     S P = w (u, w) with w = z,   (C P)_z = z,   |N| = 1,   N is normal to the surface that P spans,
 
-and a moved object's P goes by M' M^-1 to where the frame before has it. What fails is compared
+and a moved object's P goes by M' M^-1 to where the frame before has it; where the ID is that of an
+object, there are P, z and N. What fails is compared
 with what other conventions would give, so that the message can name the one that was found.
 
 Tests are of medians and shares of pixels, for samples may be anywhere in their pixels and edges
@@ -53,6 +54,7 @@ def check_frame(frame: Frame) -> None:
     A frame with fewer than `FEWEST` pixels that show a surface passes.
     """
     _check_rows(frame)
+    _check_filled(frame)
     sample = _sample(frame)
     if sample is None:
         return
@@ -88,6 +90,21 @@ def _check_rows(frame: Frame) -> None:
     if any(np.array_equal(m[:, 3], (0, 0, 0, 1)) and m[3, :3].any() for m in matrices):
         raise InputError("has transposed matrices, with the translation in the last row: write "
                          "them row by row for column vectors")
+
+
+def _check_filled(frame: Frame) -> None:
+    """Where the ID says that there is an object, the other images say something of it."""
+    shown = frame["id"] >= 0
+    if (pixels := int(shown.sum())) < FEWEST:
+        return
+    for name, says in (("position", np.isfinite(frame["position"]).all(-1)),
+                       ("depth", np.isfinite(frame["depth"]) & (frame["depth"] != 0)),
+                       ("normal", np.isfinite(frame["normal"]).all(-1)
+                        & (np.abs(frame["normal"]).sum(-1) > 0.1))):
+        if (filled := int((shown & says).sum())) < (1 - _SHARE) * pixels:
+            raise InputError(f"shows objects in {pixels} pixels by their ID, and has a {name} in "
+                             f"{filled} of these alone, elsewhere 0 or what is not finite: write "
+                             f"the {name} of every pixel that shows an object")
 
 
 def _sample(frame: Frame) -> _Sample | None:

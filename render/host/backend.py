@@ -115,8 +115,13 @@ def prepare() -> None:
     """Point Dr.Jit at a usable LLVM. Called before the first import of drjit.
 
     Raises:
-        InputError: Dr.Jit was imported before and has loaded an LLVM that it would crash with.
+        InputError: Dr.Jit was imported before and has loaded an LLVM that it would crash with, or
+            the working directory was removed: Mitsuba's import ends the process there.
     """
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        raise InputError("the working directory has been removed: change to another one") from None
     if "drjit" in sys.modules and (loaded := _loaded_llvm()) and not loaded.usable:
         raise InputError(f"drjit was imported first and has loaded the LLVM at {loaded.path}, with "
                          "which it would crash: import onespp.render before drjit and mitsuba")

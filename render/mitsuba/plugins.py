@@ -40,10 +40,14 @@ def bsdf(material: Mapping[str, Any], what: str) -> Any:
     if _kind(material["type"]) != mi.ObjectType.BSDF:
         raise SceneError(_no_such(material["type"], mi.ObjectType.BSDF, what))
     loaded = _load(plugin(material, Place(what)), what)
-    with _tried(what):
-        si, up = _surface(), mi.Vector3f(0, 0, 1)
-        loaded.eval_pdf_sample(mi.BSDFContext(), si, up, mi.Float(0.5), mi.Point2f(0.5), True)
-        loaded.eval_diffuse_reflectance(si)
+    try:
+        with _tried(what):
+            si, up = _surface(), mi.Vector3f(0, 0, 1)
+            loaded.eval_pdf_sample(mi.BSDFContext(), si, up, mi.Float(0.5), mi.Point2f(0.5), True)
+            loaded.eval_diffuse_reflectance(si)
+    except SceneError:
+        del loaded  # kept by the error's traceback, it would be part of later scenes' kernels
+        raise
     return loaded
 
 
@@ -53,13 +57,17 @@ def area_light(radiance: Any, what: str, of_mesh: bool = False) -> Any:
     An image on a mesh is refused: Mitsuba finds its light through uv, of which several triangles
     may share the same (all sides of `meshes.box` do), and then it is too dark.
     """
-    loaded = _load({"type": "area", "radiance": plugin(radiance, Place(what), validity.POSITIVE)},
+    loaded = _load({"type": "area", "radiance": plugin(radiance, Place(what), validity.RADIANCE)},
                    what)
     if of_mesh and mi.has_flag(loaded.flags(), mi.EmitterFlags.SpatiallyVarying):
         raise SceneError(f"{what} is a texture on a mesh: use one colour there, or another shape, "
                          "such as a Rectangle")
-    with _tried(what):
-        loaded.eval(_surface())
+    try:
+        with _tried(what):
+            loaded.eval(_surface())
+    except SceneError:
+        del loaded
+        raise
     return loaded
 
 
@@ -68,7 +76,7 @@ def environment(radiance: Any, what: str) -> Any:
     if isinstance(radiance, tuple):
         return _load({"type": "constant", "radiance": _rgb(radiance)}, what)
     if isinstance(radiance, Mapping):
-        radiance = _read(radiance["filename"], what, validity.POSITIVE)
+        radiance = _read(radiance["filename"], what, validity.RADIANCE)
         if radiance.shape[2:] != (3,):
             radiance = np.repeat(radiance.reshape(*radiance.shape[:2], 1), 3, axis=2)
     rows, columns = (-(-least // size) for least, size in zip(_SMALLEST_MAP, radiance.shape))

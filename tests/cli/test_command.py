@@ -210,3 +210,31 @@ def test_the_package_runs_as_a_module(tmp_path, scene_file):
         done = subprocess.run([sys.executable, "-m", "onespp", *arguments], capture_output=True,
                               text=True, check=False)
         assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("words", [
+    ["score", "{}"], ["report", "{}"], ["denoise", "{}"], ["import", "{}"], ["export", "{}"],
+    ["compare", "{}", "{}"], ["lead", "{}", "{}"], ["render", "box", "--out", "{}"]])
+def test_a_name_that_is_too_long_is_one_sentence(call, words):
+    refused(call(*(word.format("a" * 300) for word in words)), "too long")
+
+
+@pytest.mark.parametrize(("method", "words"), [
+    ("svfg", ["unknown method 'svfg'"]), ("asvgf", ["replay", "--channels +gradient"])])
+def test_a_run_refuses_a_method_before_it_renders(call, scene_file, tmp_path, method, words):
+    out = tmp_path / "out"
+    refused(call("run", scene_file, "--out", out, "--method", method), *words)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("option", ["--side", "--repeats"])
+@pytest.mark.parametrize("value", ["0", "-3", "99999999"])
+def test_bench_render_refuses_what_cannot_be_timed(call, option, value):
+    code, _, error = call("bench", "render", "box", option, value)
+    assert code == 2
+    assert option in error
+    assert "range" in error
+
+
+def test_a_size_is_written_in_plain_digits(call, tmp_path):
+    refused(call("render", "box", "--size", "\u0661x\u0662", "--out", tmp_path / "o"), "--size")

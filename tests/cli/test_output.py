@@ -66,3 +66,17 @@ def test_the_streams_are_given_back(call):
     assert call("scenes")[0] == 0
     assert (sys.stdout, sys.stderr) == before
     assert not isinstance(sys.stdout, terminal._Output)
+
+
+def test_a_name_that_the_locale_cannot_write_is_one_sentence(tmp_path):
+    environment = os.environ | {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    scene = tmp_path / "scene.py"
+    scene.write_text(
+        "from onespp.scenes.description import *\nfrom onespp.scenes.materials import diffuse\n"
+        "SCENE = Scene('W\\u00fcrfel', '', (Shape('s', Sphere(), diffuse((1, 1, 1)), "
+        "emission=1),), Camera([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -4], [0, 0, 0, 1]]), "
+        "1, 4, 4)")
+    done = subprocess.run([sys.executable, "-m", "onespp", "render", str(scene)], cwd=tmp_path,
+                          env=environment, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, "Traceback" in done.stderr) == (2, False), done.stderr
+    assert "locale (ascii)" in done.stderr

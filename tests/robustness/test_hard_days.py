@@ -407,7 +407,8 @@ def test_a_small_scene_renders_in_an_odd_environment_and_512_mb(tmp_path, scene_
 
 
 def test_an_empty_llvm_path_counts_as_none(tmp_path):
-    code = ("import render, drjit, os; from render import backend; print(backend._SET_BY_USER, "
+    code = ("import onespp.render, drjit, os; from onespp.render.host import backend; "
+            "print(backend._SET_BY_USER, "
             "bool(os.environ['DRJIT_LIBLLVM_PATH']))")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
                           env={**os.environ, "DRJIT_LIBLLVM_PATH": ""},

@@ -183,8 +183,9 @@ def test_an_environment_map_is_seen_where_nothing_is_and_lights_the_rest():
 
 def test_an_environment_that_is_no_image_is_refused():
     scene = HARD["sky"].make()
-    for image in (np.ones((4, 8)), np.full((4, 8, 3), np.nan)):
-        with pytest.raises(SceneError, match=r"environment image of shape \(4, 8"):
+    for image, complaint in ((np.ones((4, 8)), r"an image of shape \(4, 8\): use \(h, w, 3\)"),
+                             (np.full((4, 8, 3), np.nan), "NaN|not finite|non-finite")):
+        with pytest.raises(SceneError, match=f"the environment of scene 'hard/sky'.*({complaint})"):
             replace(scene, environment=image)
 
 

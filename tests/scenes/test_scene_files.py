@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from onespp.scenes.catalog import load
-from onespp.scenes.description import SceneError
+from onespp.scenes.description import Scene, SceneError
 
 HEAD = """
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape
@@ -88,7 +88,7 @@ def test_neighbours_with_names_of_the_library_take_nothing_from_it(tmp_path):
     """A whole render, in a process of its own, whose first imports come after the scene's."""
     mine = write(tmp_path, mine="import secrets, wave\n" + FILE, parts="COLOR = (0.1, 0, 0)",
                  **dict.fromkeys(TAKEN, "raise RuntimeError('the wrong one')"))
-    program = ("import sys; sys.path[:] = [p for p in sys.path if p]; import onespp; "
+    program = ("import sys; sys.path[:] = [p for p in sys.path if p]; import onespp.cli; "
                f"sys.argv = ['onespp', 'render', {mine!r}, '--out', {str(tmp_path / 'out')!r}]; "
                "onespp.cli.main()")
     done = subprocess.run([sys.executable, "-c", program], text=True, capture_output=True,
@@ -209,3 +209,31 @@ def test_a_scenes_name_that_is_no_file_name_is_refused(tmp_path, name):
     path = write(tmp_path, parts="COLOR = (0, 0, 0)", mine=FILE.replace('"mine"', repr(name)))
     with pytest.raises(SceneError, match="name"):
         load(path)
+
+
+@pytest.mark.parametrize(("place", "emission", "what"), [
+    ("lambda frame: translate(random(3))", "1", "the place of 'ball'"),
+    ("eye(4)", "lambda frame: random()", "the emission of 'ball'")])
+def test_what_differs_when_asked_twice_is_refused(tmp_path, place, emission, what):
+    """Images and matrices of one frame would not be of one place, and nothing could be resumed."""
+    path = tmp_path / "mine.py"
+    path.write_text("from numpy import eye\nfrom numpy.random import random\n"
+                    "from onespp.scenes.description import *\n"
+                    "from onespp.scenes.materials import diffuse\n"
+                    "from onespp.scenes.transforms import look_at, translate\n"
+                    f"BALL = Shape('ball', Sphere(), diffuse((1, 1, 1)), {place}, {emission})\n"
+                    "SCENE = Scene('mine', '', (BALL,), Camera(look_at((0, 0, 4), (0, 0, 0))), "
+                    "2, 8, 6)\n")
+    with pytest.raises(SceneError, match=f"{what} is not the same when frame 0 is asked for"):
+        load(str(path))
+
+
+def test_files_that_say_scenes_still_work_with_a_note(tmp_path):
+    """The package was called `scenes` before it was `onespp.scenes`; the classes are the same."""
+    path = write(tmp_path, mine=FILE.replace("onespp.scenes", "scenes"),
+                 parts="from scenes.transforms import translate\nCOLOR = (0.1, 0, 0)\n")
+    assert "from scenes." in Path(path).read_text()
+    before = {name for name in sys.modules if name.split(".")[0] == "scenes"}
+    with pytest.warns(FutureWarning, match=r"mine.py imports `scenes`: write `onespp.scenes`"):
+        assert isinstance(load(path), Scene)
+    assert {name for name in sys.modules if name.split(".")[0] == "scenes"} == before

@@ -111,6 +111,8 @@ def test_what_mitsuba_does_not_take_is_named(material, words):
     (bare(reflectance=(0.5, -1, 0)), ["'reflectance'", "-1"]),
     ({"type": "mask", "opacity": np.full((2, 2), np.nan), "b": bare()}, ["'opacity'", "finite"]),
     ({"type": "roughplastic", "int_ior": -1.0}, ["'int_ior'", "-1"]),
+    ({"type": "dielectric", "int_ior": 0.0}, ["'int_ior'", "0.1 to 10"]),  # NaN in frames
+    ({"type": "dielectric", "ext_ior": 0.0}, ["'ext_ior'", "0.1 to 10"]),
     (diffuse(np.full((4, 4, 3), 200.0)), ["200", "0 to 1", "srgb8"]),
     (diffuse(np.full((4, 4, 3), -0.1)), ["-0.1"]),
     (diffuse(np.full((4, 4, 3), np.nan)), ["not finite"]),
@@ -156,7 +158,7 @@ def test_materials_that_killed_the_process_are_refused():
     """In one child for all of them: it goes on after each, and ends well."""
     program = textwrap.dedent("""
         import numpy as np
-        from test_scene_mistakes import MitsubaScene, scene
+        from tests.scenes.test_scene_mistakes import MitsubaScene, scene
         from onespp.scenes.description import SceneError
         from onespp.scenes.materials import diffuse
         for material in ({materials}):
@@ -226,10 +228,13 @@ def test_emission_is_the_same_in_any_form(emission):
 
 @pytest.mark.parametrize(("emission", "words"), [
     ((1, 2), ["(r, g, b)"]), ((-1, 0, 0), ["-1"]), (float("nan"), ["not finite"]),
+    (1e20, ["1e+20", "0 to 1e+12"]), ((0, 1e20, 0), ["0 to 1e+12"]),
+    (np.full((4, 4, 3), 1e20), ["0 to 1e+12"]), (lambda frame: 1e20, ["frame 0", "0 to 1e+12"]),
     (True, ["True"]), ("no.png", ["'no.png'"]), (np.full((4, 4, 3), np.inf), ["not finite"]),
     (lambda frame: None, ["in frame 0", "None"]), (lambda frame: -1, ["in frame 0", "-1"]),
     (lambda frame: 1 / frame, ["in frame 0", "ZeroDivisionError"]),
     (lambda frame: np.ones((2, 2, 3)), ["in frame 0", "texture"]),
+    (lambda frame: sys.exit(0), ["in frame 0", "SystemExit"]),  # ended well, without a frame
     ({"type": "point"}, ["'point'"]), ({"type": "blackbody", "temperature": 5e3}, ["spectral"]),
     (checks((0, 0, 0), (5, 5, 5)), ["color1", "5"])])
 def test_emission_that_cannot_be_is_refused(emission, words):
@@ -306,6 +311,8 @@ def test_values_in_image_files_are_checked_too(tmp_path):
     (lambda: Mesh(np.eye(3), [[0, 1, 2], [1]]), ["faces"]),
     (lambda: Mesh(np.full((3, 3), np.nan), [[0, 1, 2]]), ["vertices", "finite"]),
     (lambda: Mesh(np.eye(3), [[0, 1, 2]], np.full((3, 3), np.inf)), ["normals", "finite"]),
+    (lambda: Mesh(np.eye(3), [[0, 1, 2]], [[0, 0, 1], [0, 0, 0], [0, 0, 1]]),
+     ["no length at 1 of 3", "as 1:"]),
     (lambda: Mesh(np.eye(3), [[0, 1, -1]]), ["-1"]),
     (lambda: Shape("x", Sphere, GRAY), ["'x'", "Sphere()"]),
     (lambda: Shape("x", Sphere(), GRAY, np.eye(3)), ["'x'", "4x4"]),
@@ -363,3 +370,18 @@ def test_a_camera_with_rounded_numbers_is_taken():
     turned = look_at((1, 2, 3), (0.3, 0.1, 0))
     for rounded in (turned.astype(np.float32), turned.round(5).tolist()):
         assert Camera(rounded).world_from_camera_at(0).dtype == np.float64
+
+
+def test_a_shape_that_inherits_from_a_sphere_is_refused():
+    class Ball(Sphere):
+        pass
+
+    refused(lambda: scene(geometry=Ball()), "the geometry of shape 'x'", "use Sphere()")
+
+
+def test_a_refused_material_is_no_part_of_later_scenes():
+    """Kernels call every live material; the error, which is kept here, must not keep this one."""
+    with pytest.raises(SceneError, match="spectral") as kept:
+        MitsubaScene(scene(bare(reflectance={"type": "blackbody", "temperature": 5000.0})))
+    assert Renderer(scene(diffuse((0.5, 0.5, 0.5))), 4, 4).frame(0)["color"].shape == (4, 4, 3)
+    assert kept.value

@@ -300,6 +300,11 @@ def test_a_plot_of_one_method_and_of_many_shows_a_point_each(tmp_path, drawn, co
         assert (colour in seen) == (i < count)
 
 
+def test_a_plot_takes_a_scene_of_any_name(tmp_path, drawn):
+    scores = drawn[1].model_copy(update={"scene": r"a$b_$^{ \frac"})
+    assert plot_speed_against_error(scores, tmp_path / "plot.png")
+
+
 def test_points_of_times_not_measured_in_turns_are_hollow(tmp_path, drawn):
     base = drawn[1].methods["fine"]
 

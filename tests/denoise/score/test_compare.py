@@ -213,3 +213,11 @@ def test_the_json_says_the_same_as_the_table(files, tmp_path):
     assert rows["input", "psnr_srgb"]["verdict"] == "same"
     CliRunner().invoke(onespp.cli.app, ["compare", *paths, "--json", str(tmp_path / "c.json")])
     assert json.loads((tmp_path / "c.json").read_text()) == json.loads(result.output)
+
+
+@pytest.mark.parametrize("name", ["", "/"])
+def test_the_json_needs_the_name_of_a_file(files, name):
+    paths = files(scores(), scores())
+    result = CliRunner().invoke(onespp.cli.app, ["compare", *paths, "--json", name])
+    assert isinstance(result.exception, InputError)
+    assert "no name for a file" in str(result.exception)

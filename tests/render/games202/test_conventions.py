@@ -115,6 +115,10 @@ OTHERS = [
     (looking_back, "looks along -z"),
     (lambda f: replace(f, screen_from_world=2 * f.screen_from_world), "fourth row"),
     (shuffled, "do not project to their pixels"),
+    *((lambda f, name=name, value=value: images(f, **{name: np.full_like(f[name], value)}),
+       f"has a {name} in 0 of these alone")
+      for name, value in (("position", np.nan), ("depth", np.inf), ("depth", 0.0),
+                          ("normal", np.nan), ("normal", 0.0))),
 ]
 
 

@@ -13,6 +13,7 @@ from onespp.render.cli.arguments import parse_size
 from onespp.render.errors import InputError
 from onespp.render.host import backend
 from onespp.render.trials import TRIALS, TrialError, attempt
+from tests.support.places import ROOT
 
 OLD = sorted(Path("/usr/lib").glob("*/libLLVM-1[0-5].so"))
 
@@ -131,3 +132,18 @@ def test_denoise_imports_no_renderer():
     code = ("import sys, onespp.denoise.run.sequence, onespp.denoise.score.sequence; "
             "sys.exit('mitsuba' in sys.modules)")
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a folder that is used cannot be removed")
+def test_a_working_directory_that_is_gone_is_one_sentence(tmp_path):
+    """Mitsuba's import ended the process: SIGABRT."""
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    program = (f"import os; os.chdir({str(gone)!r}); os.rmdir({str(gone)!r})\n"
+               f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
+               "from onespp.cli import main; sys.argv[1:] = ['render', 'box', '--size', '4x4', "
+               f"'--out', {str(tmp_path / 'o')!r}]; main()")
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True,
+                          timeout=120, check=False)
+    assert (done.returncode, done.stderr) == (
+        2, "onespp: the working directory has been removed: change to another one\n")

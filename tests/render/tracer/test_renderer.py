@@ -210,7 +210,7 @@ def test_an_empty_size_and_a_stretched_ball_are_refused_in_a_sentence():
 
 
 def test_the_benchmark_times_both_renderers():
-    from onespp.render.cli.bench import time_frames
+    from onespp.render.tracer.timing import time_frames
 
     ours, theirs = time_frames("box", 16, 2)
     assert len(ours) == len(theirs) == 2
