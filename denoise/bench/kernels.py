@@ -1,12 +1,15 @@
 """How fast the kernels are on this machine: against a trained network, and against its limits.
 
-`ms` is a kernel's own time: what it is given and what it returns are arrays on the device.
+`ms` is a kernel's own time: what it is given and what it returns are arrays on the device. What
+a method reads beside colour and surfaces (signals, shadow rays, samples shaded again) it loads
+itself: that is in its `ms`.
 `call_ms` is the method's whole call, from a frame of NumPy images to a NumPy image. All take turns,
 so that what else the machine does meets all alike, and each number is a median. The yardstick is
 Open Image Denoise's fast quality, as a method too, with albedo and normal.
 
 The shares of bandwidth and of arithmetic set the least that a kernel can do, counted by hand from
-the code below, against what `machine_limits.py` measured; the greater says what bounds it.
+the code below, against what `machine_limits.py` measured; the greater says what bounds it. Methods
+of many kernels have no count.
 `speed_up` is the kernel's time with one thread over `ms`. `peak_mb` is what a state and a call need
 at their highest, without the frame and the image; `bytes_a_pixel` the same over the pixels.
 """
@@ -26,7 +29,11 @@ import numpy as np
 from onespp.denoise.catalog import build
 from onespp.denoise.inputs.color import read_color
 from onespp.denoise.inputs.surface import read_surface
+from onespp.denoise.methods.asvgf import AsvgfState
+from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
+from onespp.denoise.oracles import filtered_innovation as innovation_oracle
 from onespp.denoise.oracles import filters as oracles
+from onespp.denoise.oracles import svgf as svgf_oracles
 from onespp.denoise.peers.oidn import AVAILABLE, Oidn
 from onespp.denoise.run.timed import timed
 from onespp.render.frame import Frame
@@ -45,14 +52,17 @@ class Kernel:
     """A row of the table.
 
     Attributes:
-        operations, bytes: a pixel, at the least; an array read or written is four bytes, once
-            for every launch that needs it.
         expected: float64 result of the second of two frames.
+        operations, bytes: a pixel, at the least; an array read or written is four bytes, once
+            for every launch that needs it. None: not counted.
+        textured: its `ms` and error are of frames with all channels, not of colour and surfaces
+            alone.
     """
 
-    operations: int
-    bytes: int
     expected: Callable[[Frame, Frame], np.ndarray]
+    operations: int | None = None
+    bytes: int | None = None
+    textured: bool = False
 
 
 def _accumulated(previous: Frame, frame: Frame, old: np.ndarray, new: np.ndarray) -> np.ndarray:
@@ -62,18 +72,30 @@ def _accumulated(previous: Frame, frame: Frame, old: np.ndarray, new: np.ndarray
 _ATROUS = (5 * (24 * _ATROUS_TAP + 17) + 48 * 12, 4 * (5 * 27 + 38))
 _TEMPORAL = (660, 4 * 51)
 
+_BILATERAL = (33 * 33 * _BILATERAL_TAP, 4 * 33 * 29)
+
+
+def _both(a: tuple[int, int], b: tuple[int, int]) -> tuple[int, int]:
+    return a[0] + b[0], a[1] + b[1]
+
+
 KERNELS = {
-    "bilateral": Kernel(33 * 33 * _BILATERAL_TAP, 4 * 33 * 29,
-                        lambda _, frame: oracles.bilateral(frame)),
-    "bilateral-separable": Kernel(2 * 33 * _BILATERAL_TAP, 4 * 2 * 31,
-                                  lambda _, frame: oracles.bilateral_separable(frame)),
-    "atrous": Kernel(*_ATROUS, lambda _, frame: oracles.atrous(frame)),
-    "temporal": Kernel(*_TEMPORAL, lambda previous, frame: _accumulated(
-        previous, frame, previous["color"], frame["color"])),
-    "assignment-atrous": Kernel(
-        _ATROUS[0] + _TEMPORAL[0], _ATROUS[1] + _TEMPORAL[1],
-        lambda previous, frame: _accumulated(previous, frame, oracles.atrous(previous),
-                                             oracles.atrous(frame))),
+    "bilateral": Kernel(lambda _, frame: oracles.bilateral(frame), *_BILATERAL),
+    "bilateral-separable": Kernel(lambda _, frame: oracles.bilateral_separable(frame),
+                                  2 * 33 * _BILATERAL_TAP, 4 * 2 * 31),
+    "atrous": Kernel(lambda _, frame: oracles.atrous(frame), *_ATROUS),
+    "temporal": Kernel(lambda previous, frame: _accumulated(
+        previous, frame, previous["color"], frame["color"]), *_TEMPORAL),
+    "assignment": Kernel(lambda previous, frame: _accumulated(
+        previous, frame, oracles.bilateral(previous), oracles.bilateral(frame)),
+        *_both(_BILATERAL, _TEMPORAL)),
+    "assignment-atrous": Kernel(lambda previous, frame: _accumulated(
+        previous, frame, oracles.atrous(previous), oracles.atrous(frame)),
+        *_both(_ATROUS, _TEMPORAL)),
+    "svgf": Kernel(lambda *frames: svgf_oracles.svgf(list(frames)), textured=True),
+    "asvgf": Kernel(lambda *frames: svgf_oracles.asvgf(list(frames)), textured=True),
+    "onespp": Kernel(lambda *frames: innovation_oracle.run(list(frames), FilteredInnovation()),
+                     textured=True),
 }
 
 
@@ -81,7 +103,7 @@ KERNELS = {
 class Row:
     """Milliseconds, shares and memory of one kernel.
 
-    None where there is no yardstick, or no second thread.
+    None where there is no yardstick, no count, or no second thread.
     """
 
     ms: float
@@ -90,8 +112,8 @@ class Row:
     share_of_oidn_fast: float | None
     call_share_of_oidn_fast: float | None
     max_error: float
-    share_of_bandwidth: float
-    share_of_arithmetic: float
+    share_of_bandwidth: float | None
+    share_of_arithmetic: float | None
     speed_up: float | None
     peak_mb: float
     bytes_a_pixel: float
@@ -136,8 +158,8 @@ def bench(height: int, width: int, repeats: int,
         kernel, ms, call = KERNELS[name], median(run.ms), median(run.call_ms)
         per_ms = height * width / ms * 1e-6  # times operations or bytes a pixel: giga a second
         rows[name] = Row(ms, call, run.first_ms, oidn and ms / oidn, oidn and call / oidn,
-                         max_error(name), kernel.bytes * per_ms / bandwidth,
-                         kernel.operations * per_ms / arithmetic,
+                         max_error(name), kernel.bytes and kernel.bytes * per_ms / bandwidth,
+                         kernel.operations and kernel.operations * per_ms / arithmetic,
                          median(run.one_thread_ms) / ms if run.one_thread_ms else None,
                          run.peak_mb, run.peak_mb * 2**20 / (height * width))
     on_step(total, total)
@@ -179,7 +201,7 @@ def scaling(repeats: int, on_step: Callable[[int, int], None] = lambda done, tot
 
 def max_error(name: str) -> float:
     """Largest difference from the formula in float64, radiance, over a small moving scene."""
-    previous, frame = (probe(*CROP, i, textured=False) for i in range(2))
+    previous, frame = (probe(*CROP, i, KERNELS[name].textured) for i in range(2))
     method = build(name)
     _, state = method(previous, method.init(*CROP))
     image, _ = method(frame, state)
@@ -205,7 +227,8 @@ class _Run:
     def __init__(self, name: str, height: int, width: int) -> None:
         self.method: Any = build(name)
         self.frames = [probe(height, width, i) for i in range(FRAMES)]
-        self.bare = [probe(height, width, i, textured=False) for i in range(FRAMES)]
+        self.kernel_frames = [probe(height, width, i, KERNELS[name].textured)
+                              for i in range(FRAMES)]
         self.state, self.kernel_state = (self.method.init(height, width) for _ in range(2))
         self.ms: list[float] = []
         self.call_ms: list[float] = []
@@ -224,12 +247,12 @@ class _Run:
 
     def measure_kernel(self, i: int) -> float:
         """Milliseconds from arrays to arrays."""
-        stencil = self.kernel_state.stencil
-        color, surface = read_color(self.bare[i], stencil), read_surface(self.bare[i], stencil)
+        stencil, frame = self.kernel_state.stencil, self.kernel_frames[i]
+        color, surface = read_color(frame, stencil), read_surface(frame, stencil)
         dr.eval(color, surface)
 
         def kernel() -> Any:
-            result = self.method.on_lanes(self.bare[i], color, surface, self.kernel_state)
+            result = self.method.on_lanes(frame, color, surface, self.kernel_state)
             dr.eval(result[0])
             return result
 
@@ -248,7 +271,10 @@ class _Run:
             _, state = self.method(frame, state)
             dr.sync_thread()
         arrays = dr.detail.malloc_watermark(kind) - before
-        return (arrays + state.stencil.plane_bytes) / 2**20
+        planes = state.stencil.plane_bytes
+        if isinstance(state, AsvgfState):
+            planes += state.gradients.strata.plane_bytes
+        return (arrays + planes) / 2**20
 
 
 class _Network:

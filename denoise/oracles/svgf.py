@@ -1,4 +1,5 @@
-"""SVGF in float64 NumPy, as plainly as it can be written: nothing is shared with the kernels."""
+"""SVGF and A-SVGF in float64 NumPy, as plainly as they can be written: nothing is shared with the
+kernels."""
 
 from __future__ import annotations
 
@@ -85,10 +86,16 @@ def svgf(frames: list[Frame], alpha: float = 0.2, alpha_moments: float = 0.2,
          normal_power: float = 128, min_cosine: float = 0.9, plane_tolerance: float = 0.02,
          demodulate: bool = True, split: bool = True, accumulate: bool = True,
          fallback: bool = True, temporal_variance: bool = True,
-         feedback: bool = True) -> np.ndarray:
-    """The last frame's result; parameters as of `onespp.denoise.methods.svgf.Svgf`."""
+         feedback: bool = True, alpha_indirect: float | None = None,
+         changes: list[np.ndarray] | None = None) -> np.ndarray:
+    """The last frame's result; parameters as of `onespp.denoise.methods.svgf.Svgf`.
+
+    Args:
+        alpha_indirect: that of indirect light; None: `alpha`.
+        changes: (h, w, signals) lambda of each frame (A-SVGF); None: 0 everywhere.
+    """
     records, previous, result = None, frames[0], np.zeros(0)
-    for frame in frames:
+    for i, frame in enumerate(frames):
         shape = frame["id"].shape
         albedo = np.maximum(frame["albedo"], 0.01) if demodulate else np.ones((*shape, 3))
         albedo = np.where((frame["albedo"] < 0.01).all(-1, keepdims=True), 1, albedo)
@@ -98,17 +105,20 @@ def svgf(frames: list[Frame], alpha: float = 0.2, alpha_moments: float = 0.2,
                   for n in names]
         now = [np.concatenate([c, luminance(c)[..., None], luminance(c)[..., None]**2], -1)
                for c in lights]
-        old = np.full((*shape, 1 + 5 * len(now)), np.nan)
+        old = np.full((*shape, 6 * len(now)), np.nan)
         if records is not None and accumulate:
             old = oracles.reproject_bilinear(previous, frame, records, min_cosine,
                                              plane_tolerance, fallback)
-        found = np.isfinite(old[..., :1])
-        length = np.where(found, np.minimum(old[..., :1] + 1, max_history_length), 1)
-        weight = np.concatenate([np.maximum(a, 1 / length) for a in
-                                 (alpha, alpha, alpha, alpha_moments, alpha_moments)], -1)
-        kept, result = [length], np.zeros((*shape, 3))
+        kept, result = [], np.zeros((*shape, 3))
         for s, signal in enumerate(now):
-            before = old[..., 1 + 5 * s:6 + 5 * s]
+            before, found = old[..., 6 * s + 1:6 * s + 6], np.isfinite(old[..., 6 * s:6 * s + 1])
+            change = changes[i][..., s:s + 1] if changes else np.zeros((*shape, 1))
+            length = old[..., 6 * s:6 * s + 1] * (1 - change)**10 + 1
+            length = np.where(found, np.minimum(length, max_history_length), 1)
+            a = alpha if s == 0 or alpha_indirect is None else alpha_indirect
+            weight = np.concatenate([np.maximum(least, 1 / length) for least in
+                                     (a, a, a, alpha_moments, alpha_moments)], -1)
+            weight = change + (1 - change) * weight
             mixed = np.where(found, weight * signal + (1 - weight) * before, signal)
             spatial = (length < 4) if temporal_variance else np.full(length.shape, True)
             moments = np.where(spatial, spatial_moments(frame, mixed[..., 3:], sigma_depth,
@@ -116,12 +126,43 @@ def svgf(frames: list[Frame], alpha: float = 0.2, alpha_moments: float = 0.2,
             variance = (np.maximum(moments[..., 1] - moments[..., 0]**2, 0)
                         * np.maximum(4 / length[..., 0], 1))
             color, first = mixed[..., :3], mixed[..., :3]
-            for i in range(levels):
-                color, variance = level(frame, color, variance, 1 << i, sigma_luminance,
+            for k in range(levels):
+                color, variance = level(frame, color, variance, 1 << k, sigma_luminance,
                                         sigma_depth, normal_power)
-                first = color if i == 0 else first
-            kept += [first if feedback else mixed[..., :3], mixed[..., 3:]]
+                first = color if k == 0 else first
+            kept += [length, first if feedback else mixed[..., :3], mixed[..., 3:]]
             result += color
         records, previous = np.concatenate(kept, -1), frame
         result = result * albedo + emission
     return result
+
+
+def shading_changes(frame: Frame, levels: int = 3, scale: float = 1) -> np.ndarray:
+    """(h, w, 2) lambda of direct and indirect light, from the samples shaded again."""
+    now, before = (frame[name].astype(np.float64) for name in ("replay", "replay_before"))
+    height, width, _ = now.shape
+    sums = np.zeros((2, -(-height // 3), -(-width // 3), 2))
+    for y, x in np.argwhere((np.minimum(now, before) >= 0).all(-1)):
+        sums[0, y // 3, x // 3] += np.abs(now[y, x] - before[y, x])
+        sums[1, y // 3, x // 3] += np.maximum(now[y, x], before[y, x])
+    h = {0: 3 / 8, 1: 1 / 4, 2: 1 / 16}
+    _, rows, columns, _ = sums.shape
+    for k in range(levels):
+        step = 1 << k
+        padded = np.pad(sums, [(0, 0), (2 * step,) * 2, (2 * step,) * 2, (0, 0)])
+        sums = np.zeros_like(sums)
+        for ky in range(-2, 3):
+            for kx in range(-2, 3):
+                top, left = (2 + ky) * step, (2 + kx) * step
+                sums += h[abs(ky)] * h[abs(kx)] * padded[:, top:top + rows, left:left + columns]
+    g = np.where(sums[1] > 1e-6, sums[0] / np.maximum(sums[1], 1e-6), 0)
+    return np.minimum(scale * g, 1).repeat(3, 0).repeat(3, 1)[:height, :width]
+
+
+def asvgf(frames: list[Frame], alpha: float = 0.02, alpha_indirect: float = 0.01,
+          max_history_length: float = 256, gradient_levels: int = 3, gradient_scale: float = 1,
+          **others: float | bool) -> np.ndarray:
+    """The last frame's result; parameters as of `onespp.denoise.methods.asvgf.Asvgf`."""
+    changes = [shading_changes(frame, gradient_levels, gradient_scale) for frame in frames]
+    return svgf(frames, alpha, max_history_length=max_history_length,
+                alpha_indirect=alpha_indirect, changes=changes, **others)  # pyright: ignore

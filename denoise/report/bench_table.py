@@ -25,8 +25,8 @@ def print_bench(result: Bench, console: Console | None = None) -> None:
         speed.add_row(name, f"{row.ms:.1f}", _number(row.share_of_oidn_fast, 3),
                       f"{row.call_ms:.1f}", _number(row.call_share_of_oidn_fast, 3),
                       f"{row.first_ms:.0f}", _number(row.speed_up, 2))
-        limits.add_row(name, f"{row.max_error:.0e}", f"{row.share_of_bandwidth:.0%}",
-                       f"{row.share_of_arithmetic:.0%}", f"{row.peak_mb:.0f}",
+        limits.add_row(name, f"{row.max_error:.0e}", _percent(row.share_of_bandwidth),
+                       _percent(row.share_of_arithmetic), f"{row.peak_mb:.0f}",
                        f"{row.bytes_a_pixel:.0f}")
     console.print(speed)
     console.print(limits)
@@ -48,7 +48,8 @@ def caption(result: Bench) -> str:
     return (f"Medians of {result.repeats}, taking turns. ms: arrays to arrays; call: images to "
             f"images; first: compilation included. {yardstick}. Bandwidth and arithmetic: share of "
             f"this machine's, measured just now: {result.bandwidth_gb_s:.0f} GB/s, "
-            f"{result.arithmetic_gflop_s:.0f} GFLOP/s. MB: a state and a call at their highest.")
+            f"{result.arithmetic_gflop_s:.0f} GFLOP/s; -: not counted. MB: a state and a call at "
+            "their highest.")
 
 
 def print_scaling(result: Scaling, console: Console | None = None) -> None:
@@ -63,3 +64,7 @@ def print_scaling(result: Scaling, console: Console | None = None) -> None:
 
 def _number(value: float | None, digits: int) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{share:.0%}"

@@ -18,7 +18,6 @@ from onespp.denoise.methods.assignment import Assignment, AssignmentAtrous
 from onespp.denoise.methods.atrous import Atrous
 from onespp.denoise.methods.bilateral import Bilateral
 from onespp.denoise.methods.temporal import Temporal
-from onespp.denoise.run.timed import timed
 from onespp.render.errors import InputError
 from tests.support.frames import make_frame, noisy, translation, with_images
 from tests.support.recordings import compiled
@@ -417,13 +416,6 @@ def test_the_motion_table_grows_with_the_scene():
     assert loaded.size == 128 * 16
     np.testing.assert_array_equal(loaded[:70 * 16], table.ravel())
     assert np.isnan(loaded[70 * 16:]).all()
-
-
-def test_timed_waits_for_kernels():
-    stencil = stencil_of(64, 64, 1)
-    result, ms = timed(lambda: stencil.image([stencil.constant(2)]))
-    assert result.shape == (64, 64)
-    assert 0 < ms < 60_000
 
 
 @pytest.mark.parametrize(("size", "layout", "words"), [

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from onespp.denoise.catalog import METHODS, build, parameters
+from onespp.denoise.inputs import repair as repair_module
 from onespp.denoise.inputs.repair import repair
-from onespp.denoise.run.timed import timed
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from tests.support.frames import make_frame, noisy, translation, with_images
@@ -252,9 +252,18 @@ def test_repair_takes_the_mean_of_the_same_object_around():
     assert (repair(bad, alone)[4, 5] == 0).all()
 
 
-def test_an_image_full_of_bad_pixels_is_repaired_in_reasonable_time():
+def test_a_bad_pixel_is_looked_at_until_a_good_one_is_found_and_no_longer(monkeypatch):
+    """One pixel in 4x4 is good: the next one is 1 to 3 pixels off, 3 only at the far edges."""
+    asked, sums = [], repair_module._sums_around
+
+    def counting(color, good, id_, y, x, radius):
+        asked.append((radius, len(y)))
+        return sums(color, good, id_, y, x, radius)
+
+    monkeypatch.setattr(repair_module, "_sums_around", counting)
     color, id_ = np.full((256, 256, 3), np.nan, np.float32), np.zeros((256, 256), np.int32)
     color[::4, ::4] = 0.25
-    _, ms = timed(lambda: repair(color, id_))
     np.testing.assert_array_equal(repair(color, id_), 0.25)
-    assert ms < 10_000
+    near = 256 - 64 - 1  # rows at most 1 pixel from a good one
+    assert asked == [(1, 256**2 - 64**2), (2, 256**2 - near**2), (3, 256**2 - 255**2),
+                     *((radius, 0) for radius in range(4, 9))]

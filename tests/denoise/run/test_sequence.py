@@ -1,7 +1,6 @@
 """Files beside denoising: the same results, times of calls alone, a word on what bounds it."""
 
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -11,9 +10,11 @@ from onespp.denoise.run.sequence import ALONE, Pace, denoise_sequence
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Manifest
 from onespp.render.files.sequence import FrameSequence
+from tests.support.clock import Clock
 from tests.support.frames import make_frame, noisy, translation
 
 H, W, FRAMES = 9, 11, ALONE + 4
+LONG = 20  # seconds, after which a wait has failed
 
 
 @pytest.fixture
@@ -39,28 +40,69 @@ def test_results_are_those_of_the_method_called_frame_by_frame(sequence):
 
 
 def test_files_are_read_and_written_beside_the_calls(sequence, monkeypatch):
-    """0.1 s in each call, 0.05 s in each file read: beside one another 0.1 s a frame."""
-    read = FrameSequence.read_frame
+    """A call waits until the next frame has been read, a write for the call after its own to begin:
+    one after another, they would wait for ever."""
+    begun, been_read = ([threading.Event() for _ in range(FRAMES)] for _ in range(2))
+    last, clock = FRAMES - 1, Clock()
+    clock.put_into(monkeypatch, "onespp.denoise.run.sequence", "onespp.denoise.run.timed")
+    read, write = FrameSequence.read_frame, FrameSequence.write_result
 
-    def slowly(self, *arguments):
-        time.sleep(0.05)
-        return read(self, *arguments)
+    def reading(self, index, *arguments):
+        frame = read(self, index, *arguments)
+        clock.pass_(0.05)
+        been_read[index].set()
+        return frame
+
+    def writing(self, name, index, *arguments):
+        assert index < ALONE or index == last or begun[index + 1].wait(LONG), index
+        clock.pass_(0.01)
+        write(self, name, index, *arguments)
 
     class Slow(Temporal):
         def __call__(self, frame, state):
-            time.sleep(0.1)
+            begun[frame.index].set()
+            alone = frame.index < ALONE or frame.index == last
+            assert alone or been_read[frame.index + 1].wait(LONG), frame.index
+            clock.pass_(0.1)
             return frame["color"], state
 
-    monkeypatch.setattr(FrameSequence, "read_frame", slowly)
+    monkeypatch.setattr(FrameSequence, "read_frame", reading)
+    monkeypatch.setattr(FrameSequence, "write_result", writing)
     paces, threads = [], threading.active_count()
     denoise_sequence(sequence, Slow(), "slow", on_pace=paces.append)
     assert threading.active_count() == threads
     (pace,) = paces
     assert pace.frames == 4
-    assert pace.denoising >= 0.4
-    assert pace.files >= 0.15
-    assert pace.seconds < pace.denoising + 0.7 * pace.files
+    assert pace.denoising == pytest.approx(0.4)
+    assert pace.files == pytest.approx(4 * 0.06)
+    assert pace.seconds == pytest.approx(0.4)  # this thread's
     assert "bound by denoising" in str(pace)
+
+
+def test_the_first_frames_are_read_and_written_while_nothing_is_denoised(sequence, monkeypatch):
+    said = []
+    read, write = FrameSequence.read_frame, FrameSequence.write_result
+
+    def reading(self, index, *arguments):
+        said.append(f"read {index}")
+        return read(self, index, *arguments)
+
+    def writing(self, name, index, *arguments):
+        write(self, name, index, *arguments)
+        said.append(f"written {index}")
+
+    class Noting(Temporal):
+        def __call__(self, frame, state):
+            said.append(f"begin {frame.index}")
+            result = super().__call__(frame, state)
+            said.append(f"end {frame.index}")
+            return result
+
+    monkeypatch.setattr(FrameSequence, "read_frame", reading)
+    monkeypatch.setattr(FrameSequence, "write_result", writing)
+    denoise_sequence(sequence, Noting(), "noting")
+    assert said[:4 * ALONE] == [f"{what} {i}" for i in range(ALONE)
+                                for what in ("read", "begin", "end", "written")]
 
 
 def test_the_pace_names_what_bounds_it():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -17,7 +16,17 @@ from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import Run
 from onespp.render.files.times import read_times
+from tests.support.clock import Clock
 from tests.support.small_sequence import HEIGHT, WIDTH, small_sequence
+
+CLOCK = Clock()
+
+
+@pytest.fixture(autouse=True)
+def clock(monkeypatch):
+    """The time that passes is what `Sleeper` says."""
+    CLOCK.put_into(monkeypatch, "onespp.denoise.run.timed")
+    return CLOCK
 
 
 @dataclass(frozen=True)
@@ -32,7 +41,7 @@ class Sleeper:
         return []
 
     def __call__(self, frame, seen):
-        time.sleep(1e-3 * self.ms * (1 if seen else 10))
+        CLOCK.pass_(1e-3 * self.ms * (1 if seen else 10))
         return np.array(frame["color"]), [*seen, frame.index]
 
 
@@ -46,16 +55,24 @@ class Greedy(Sleeper):
 
 
 def test_methods_are_timed_in_turns_and_ratios_are_to_the_first(tmp_path):
-    sequence = small_sequence(tmp_path / "a")
-    told = []
-    times = time_methods(sequence, {"slow": Sleeper(6.0), "fast": Sleeper(2.0)}, rounds=4,
+    """On a machine that takes 1, 2, 3, 4, 1, ... times as long from step to step, 6 and 2 ms."""
+    sequence, told = small_sequence(tmp_path / "a"), []
+
+    @dataclass(frozen=True)
+    class Disturbed(Sleeper):
+        def __call__(self, frame, seen):
+            for _ in range(len(told) % 4):
+                super().__call__(frame, seen)
+            return super().__call__(frame, seen)
+
+    times = time_methods(sequence, {"slow": Disturbed(6.0), "fast": Disturbed(2.0)}, rounds=4,
                          on_step=told.append)
     slow, fast = times.methods["slow"], times.methods["fast"]
-    assert 6 <= slow.ms < slow.first_ms / 4
-    assert 0.1 < fast.ratio < 0.8  # 1 / 3 on a machine with nothing else to do
-    assert slow.ratio == 1
-    assert fast.ratio_quartiles[0] <= fast.ratio <= fast.ratio_quartiles[1]
-    assert slow.first_ms > 50
+    assert (slow.first_ms, fast.first_ms) == pytest.approx((60, 20))
+    assert (slow.ms, fast.ms) == pytest.approx((15, 5))  # medians of 1, 1, 2, 2, 3, 3, 4, 4 times
+    assert slow.ms_quartiles == pytest.approx((6 * 1.75, 6 * 3.25))
+    assert (slow.ratio, fast.ratio) == pytest.approx((1, 1 / 3))
+    assert fast.ratio_quartiles == pytest.approx((1 / 3, 1 / 3))  # of the same step
     assert times.steps == 8  # the first round, with its 60 ms, does not count
     assert told == list(range(1, 11))
     assert read_times(sequence.folder) == times
@@ -70,7 +87,7 @@ def test_the_order_turns_so_that_none_always_comes_first(tmp_path):
 
         def __call__(self, frame, seen):
             calls.append(self.name)
-            return np.array(frame["color"]), seen
+            return super().__call__(frame, seen)
 
     methods = {n: Noting(name=n) for n in "abc"}
     time_methods(small_sequence(tmp_path / "a"), methods, frames=2, rounds=1)
@@ -95,10 +112,11 @@ def test_a_score_takes_the_times_measured_in_turns_for_the_same_settings(tmp_pat
     scores = score(sequence)
     sleeper, other = scores.methods["sleeper"], scores.methods["other"]
     assert sleeper.interleaved
-    assert sleeper.ms_per_frame == times.methods["sleeper"].ms
+    assert sleeper.ms_per_frame == times.methods["sleeper"].ms == pytest.approx(3)
     assert sleeper.megapixels_per_s == pytest.approx(HEIGHT * WIDTH / sleeper.ms_per_frame / 1e3)
     assert not other.interleaved  # it ran with another parameter
-    assert other.ms_per_frame == sequence.read_run("other").ms[1]
+    assert other.ms_per_frame == sequence.read_run("other").ms[1] == pytest.approx(3)
+    assert other.startup_ms == pytest.approx(27)
     assert any("Times of sleeper were measured in turns" in note and "medians of their own runs"
                in note for note in scores.notes)
 
