@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import shlex
+import subprocess
 import sys
 
 import numpy as np
 import pytest
 
+from onespp.denoise.run import external
 from onespp.denoise.run.external import denoise_externally
 from onespp.render.errors import InputError
+from tests.support.clock import Clock
 from tests.support.small_sequence import HEIGHT, WIDTH, small_sequence
 
 # Doubles every frame, and notes in its results how many it was told of.
@@ -58,15 +61,32 @@ def python(code: str) -> str:
     return shlex.join([sys.executable, "-c", code, "{input}", "{output}"])
 
 
-def test_its_results_and_its_time_are_those_of_a_method(sequence, program):
+def test_its_results_and_its_time_are_those_of_a_method(sequence, program, monkeypatch):
+    """0.5 s of the program over two frames; export and import take no part in it."""
+    clock, start = Clock(), subprocess.run
+
+    def taking_half_a_second(*arguments, **options):
+        clock.pass_(0.5)
+        return start(*arguments, **options)
+
+    def passing(function):
+        def slowly(*arguments):
+            clock.pass_(7)
+            return function(*arguments)
+        return slowly
+
+    clock.put_into(monkeypatch, "onespp.denoise.run.external")
+    monkeypatch.setattr(subprocess, "run", taking_half_a_second)
+    for name in ("export_games202", "import_result"):
+        monkeypatch.setattr(external, name, passing(getattr(external, name)))
     run = denoise_externally(sequence, program, "doubled")
     assert sequence.methods() == ["doubled"]
     for i in sequence.frames:
         np.testing.assert_allclose(sequence.read_result("doubled", i),
                                    2 * sequence.read_frame(i, ("color",))["color"])
     assert run == sequence.read_run("doubled")
-    assert set(run.ms) == set(sequence.frames)
-    assert all(ms > 1 for ms in run.ms.values())
+    assert run.ms == dict.fromkeys(sequence.frames, 250)
+    assert run.first_ms == 250
     assert run.parameters["external"] == program
 
 
