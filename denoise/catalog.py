@@ -177,8 +177,8 @@ _WORDS = {"true": True, "yes": True, "on": True, "1": True,
 
 def _parse(key: str, text: str, kind: type) -> bool | int | float | str:
     try:
-        return _WORDS[text.strip().lower()] if kind is bool else kind(text)
-    except (KeyError, ValueError):
+        return _WORDS[str(text).strip().lower()] if kind is bool else kind(text)
+    except (KeyError, ValueError, TypeError):  # None, say
         expected = {bool: "true or false", int: "a whole number", float: "a number"}[kind]
         raise InputError(f"{key} is '{text}': use {expected}") from None
 

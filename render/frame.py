@@ -13,10 +13,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
-from .channels import CHANNELS
+from .channels import CHANNELS, IDS
 from .errors import InputError
 
 
@@ -26,13 +27,14 @@ class Frame:
 
     Attributes:
         index: frame number in the animation.
-        images: channel name -> array; (h, w) for one component, else (h, w, c), float32,
-            `id` int32. See `render/channels.py` for meaning and units.
+        images: channel name -> array; (h, w) for one component, else (h, w, c), float32 (of other
+            floats, methods make that), `id` int32. See `render/channels.py` for meaning and units.
         camera_from_world, screen_from_world: (4, 4) float64.
         world_from_object: (n, 4, 4) float64, indexed by object ID.
 
     Raises:
-        InputError: an unknown channel, shapes that disagree, a non-finite matrix.
+        InputError: an unknown channel, an image of another type or without pixels, shapes that
+            disagree, IDs that are not whole, a non-finite matrix.
     """
 
     index: int
@@ -42,13 +44,18 @@ class Frame:
     world_from_object: np.ndarray
 
     def __post_init__(self) -> None:
-        if not self.images:
-            raise InputError(f"frame {self.index} has no images")
+        if not isinstance(self.images, Mapping) or not self.images:
+            raise InputError(f"frame {self.index} has no images: give a dict of arrays by channel")
         size = None
         for name, image in self.images.items():
             if name not in CHANNELS:
                 raise InputError(f"frame {self.index} has an unknown channel '{name}'")
             c = CHANNELS[name].components
+            _check_type(image, "fiu" if name in IDS else "f",
+                        f"channel '{name}' of frame {self.index}")
+            if name == "id" and image.dtype != np.int32 and not _is_whole(image):
+                raise InputError(f"channel 'id' of frame {self.index} has other values than whole "
+                                 "numbers of 32 bits: use int32")
             if image.ndim != (2 if c == 1 else 3) or (c > 1 and image.shape[2] != c):
                 raise InputError(
                     f"channel '{name}' of frame {self.index} has shape {image.shape}, "
@@ -58,10 +65,9 @@ class Frame:
                 raise InputError(
                     f"channel '{name}' of frame {self.index} is {image.shape[1]}x{image.shape[0]}, "
                     f"the others are {size[1]}x{size[0]}")
-        for name in ("camera_from_world", "screen_from_world", "world_from_object"):
-            matrix = np.asarray(getattr(self, name), np.float64)
-            if matrix.shape[-2:] != (4, 4) or not np.isfinite(matrix).all():
-                raise InputError(f"{name} of frame {self.index} is not a finite 4x4 matrix")
+        for name, dimensions in (("camera_from_world", 2), ("screen_from_world", 2),
+                                 ("world_from_object", 3)):
+            matrix = _matrix(getattr(self, name), f"{name} of frame {self.index}", dimensions)
             object.__setattr__(self, name, matrix)
         object.__setattr__(self, "images", MappingProxyType(dict(self.images)))
 
@@ -83,3 +89,32 @@ class Frame:
                 f"frame {self.index} lacks the channel '{channel}' "
                 f"(it has {', '.join(self.images)})")
         return self.images[channel]
+
+
+def _check_type(image: Any, kinds: str, what: str) -> None:
+    """InputError unless it is an array with values, of one of NumPy's kinds of numbers."""
+    if not isinstance(image, np.ndarray):
+        raise InputError(f"{what} is a {type(image).__name__}: use a NumPy array")
+    if image.dtype.kind not in kinds:
+        raise InputError(f"{what} is of {image.dtype}: use float32"
+                         + (" or int32" if "i" in kinds else ""))
+    if not image.size:
+        raise InputError(f"{what} has no pixels")
+
+
+def _is_whole(image: np.ndarray) -> bool:
+    """Whether int32 holds the same values."""
+    return bool((np.abs(image.astype(np.float64)) <= 2**31 - 1).all()
+                and (image == np.floor(image)).all())
+
+
+def _matrix(value: Any, what: str, dimensions: int) -> np.ndarray:
+    """A finite (4, 4) or, of three dimensions, (n, 4, 4) float64; InputError if it is not one."""
+    try:
+        matrix = np.asarray(value, np.float64)
+    except (TypeError, ValueError):  # not numbers, or rows of several lengths
+        matrix = np.empty(0)
+    if (matrix.ndim, matrix.shape[-2:]) != (dimensions, (4, 4)) or not np.isfinite(matrix).all():
+        shape = "a finite 4x4 matrix" if dimensions == 2 else "finite 4x4 matrices, (n, 4, 4)"
+        raise InputError(f"{what} is not {shape}")
+    return matrix

@@ -80,9 +80,12 @@ class Mesh:
             array = getattr(self, name)
             if array is not None:
                 try:
-                    array = np.asarray(array, np.float64)
+                    if np.iscomplexobj(array):
+                        raise TypeError
+                    array = np.array(array, np.float64)  # a copy: theirs may change
                 except (TypeError, ValueError):
-                    raise SceneError(f"mesh {name} are not numbers in rows of {columns}") from None
+                    raise SceneError(f"mesh {name} are not real numbers in rows of {columns}"
+                                     ) from None
                 if array.shape != (n, columns):
                     raise SceneError(f"mesh {name} have shape {array.shape}, "
                                      f"expected ({n}, {columns})")

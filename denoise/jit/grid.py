@@ -21,6 +21,7 @@ scatter would cost five times as much, and in a frozen function it silently writ
 from __future__ import annotations
 
 from collections.abc import Sequence
+from numbers import Integral
 from types import ModuleType
 from typing import Any
 
@@ -54,18 +55,20 @@ class Stencil:
         Float, Int, UInt: Dr.Jit array types of the device.
 
     Raises:
-        InputError: an empty image, an unknown device or layout.
+        InputError: an empty image or none of whole pixels, an unknown device or layout.
     """
 
     def __init__(self, height: int, width: int, reach: int, device: str = "auto",
                  layout: str | None = None) -> None:
+        if not (isinstance(height, Integral) and isinstance(width, Integral)):
+            raise InputError(f"an image of {width!r} x {height!r} pixels: use whole numbers")
         if height < 1 or width < 1:
             raise InputError(f"an image of {width}x{height} pixels is empty: use 1x1 or more")
         device = backend.choose(device)
         self.layout = layout or ("views" if device == "llvm" else "gather")
         if self.layout not in ("views", "gather") or (self.layout, device) == ("views", "cuda"):
             raise InputError(f"layout '{self.layout}' does not exist on {device}: use gather")
-        self.height, self.width, self.reach = height, width, max(reach, 1)
+        self.height, self.width, self.reach = int(height), int(width), max(reach, 1)
         self.stride = _spread(width + self.reach)
         self.lanes = height * self.stride
         self.planes_made = 0

@@ -14,6 +14,7 @@ from onespp.denoise.inputs.color import read_color
 from onespp.denoise.inputs.surface import GUIDES, Surface, read_surface
 from onespp.denoise.jit.arrays import Color
 from onespp.denoise.jit.grid import Stencil
+from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 
 
@@ -54,9 +55,10 @@ class OnLanes(Generic[State]):
         Where the input is nowhere negative, neither is the result (`filters/debts.py`).
 
         Raises:
-            InputError: a channel is missing, the size is not the state's, or the frame has
-                other objects than the one before it.
+            InputError: a channel is missing, the size is not the state's, the frame has other
+                objects than the one before it, or the state is not one that `init` made.
         """
+        check_call(frame, state, self.reach)
         color, surface = read_color(frame, state.stencil), read_surface(frame, state.stencil)
         result, after = self.on_lanes(frame, color, surface, state)
         image = state.stencil.image(result)
@@ -75,3 +77,13 @@ class OnLanes(Generic[State]):
             linear radiance, which rounding may leave below 0, and the state for the next frame.
         """
         raise NotImplementedError
+
+
+def check_call(frame: Frame, state: OnStencil, reach: int) -> None:
+    """InputError where a call is given something else, or too small a state, which taps leave."""
+    if not isinstance(frame, Frame):
+        raise InputError(f"a method was called with a {type(frame).__name__}: give it a Frame")
+    stencil = getattr(state, "stencil", None)
+    if not isinstance(stencil, Stencil) or stencil.reach < reach:
+        raise InputError("a method was called with a state that is not its own: begin with that of "
+                         "its init(height, width), and go on with the one that its call returns")

@@ -36,7 +36,7 @@ def split_errors(sequences: list[FrameSequence], methods: list[str]) -> dict[str
     Raises:
         InputError: the sequences differ in more than the seed, or do not differ in it.
     """
-    _check(sequences)
+    check_seeds(sequences)
     sums = {name: np.zeros(3) for name in methods}
     counts = dict.fromkeys(methods, 0)
     for i in sequences[0].frames:
@@ -66,7 +66,8 @@ def _split(images: list[tuple[np.ndarray, np.ndarray]], noise: float) -> np.ndar
     return np.array([np.mean((a - b) ** 2), bias, variance])
 
 
-def _check(sequences: list[FrameSequence]) -> None:
+def check_seeds(sequences: list[FrameSequence]) -> None:
+    """InputError as of `split_errors`: of what can be told before anything is read or scored."""
     first = sequences[0].manifest
     for other in sequences[1:]:
         changed = other.manifest.model_copy(update={"seed": first.seed})

@@ -27,7 +27,7 @@ from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.files.times import read_times
 from onespp.render.progress import Progress
 
-from .bias_variance import split_errors
+from .bias_variance import check_seeds, split_errors
 from .commands import commands
 from .cost import cost
 from .frame_truth import read_frame_truth
@@ -56,6 +56,8 @@ def score(sequence: FrameSequence, methods: list[str] | None = None,
         InputError: an unknown method, no frames, a file that cannot be read or written, or
             `seeds` that are of something else.
     """
+    if seeds:  # before the minutes that scoring takes
+        check_seeds([sequence, *seeds])
     scores = measure_sequence(sequence, methods, progress)
     if seeds:
         splits = split_errors([sequence, *seeds], list(scores.methods))

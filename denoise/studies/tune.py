@@ -23,7 +23,7 @@ from onespp.denoise.metrics.errors import psnr
 from onespp.denoise.metrics.means import mean_decibels
 from onespp.denoise.metrics.tonemap import srgb_from_linear
 from onespp.render.errors import InputError
-from onespp.render.files.atomic import write_text
+from onespp.render.files.atomic import read_bytes, write_text
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.frame import Frame
 
@@ -136,10 +136,11 @@ def starting_point(name: str, given: Mapping[str, str],
 
 
 def _read(file: Path) -> dict[str, float]:
+    data = read_bytes(file)
     try:
-        tried = json.loads(file.read_text())
+        tried = json.loads(data)
         return {json.dumps(present_parameters(json.loads(key)), sort_keys=True): float(value)
                 for key, value in tried.items()}
-    except (OSError, ValueError, AttributeError, TypeError) as error:
+    except (ValueError, AttributeError, TypeError, RecursionError) as error:
         raise InputError(f"{file} does not hold an earlier search ({error}): "
                          "remove it, or give another --out") from error

@@ -95,13 +95,17 @@ def import_games202(folder: Path | str, out: Path | str, *, scene: str | None = 
         height=header.height, fps=fps, seed=None, channels=tuple(_FILES),
         commands=(command,) if command else (),
         objects=tuple(f"object_{i:0{digits}d}" for i in range(objects))), overwrite)
+    negative = []
     try:
         for i in frames:
             if not sequence.has_frame(i):
                 frame = _read_frame(found, i, size, objects)
                 if check:
                     _check_convention(found, frame)
+                if (frame["color"] < 0).any():
+                    negative.append(i)
                 sequence.write_frame(frame, {"scene": name})
+        _tell_negative("beauty", negative, tell)
         for a, b in gaps(frames):
             tell(f"there is no frame between {a} and {b}: methods with a history take {b} for the "
                  f"frame after {a}")
@@ -138,12 +142,16 @@ def _check_convention(found: Found, frame: Frame, before: Frame | None = None) -
 
 def _take_references(found: Found, sequence: FrameSequence, tell: Callable[[str], None]) -> None:
     taken = [i for i in found.references if i in sequence.frames]
+    negative = []
     for i in taken:
         color = _image(found.references[i], _RGB, sequence.size)
+        if (color < 0).any():
+            negative.append(i)
         sequence.write_reference(i, Reference(color, np.full_like(color, np.nan), None))
     if taken:
         tell(f"took {len(taken)} references from {found.references[taken[0]].parent}; how many "
              "samples they have, and how noisy they are, is not known")
+    _tell_negative("reference", negative, tell)
     _tell_strangers("references", found.references, sequence, tell)
 
 
@@ -157,6 +165,13 @@ def _take_results(found: Found, sequence: FrameSequence, tell: Callable[[str], N
         tell(f"took {len(taken)} results from {found.results[taken[0]].parent}, as those of "
              f"the method '{RESULTS}'")
     _tell_strangers("results", found.results, sequence, tell)
+
+
+def _tell_negative(what: str, frames: list[int], tell: Callable[[str], None]) -> None:
+    """As a renderer's filter with negative lobes makes it, or a difference of images."""
+    if frames:
+        tell(f"the {what} has negative radiance in frames {format_frames(frames)}: methods take it "
+             "as it is, scores as black")
 
 
 def _tell_strangers(what: str, files: Mapping[int, Path], sequence: FrameSequence,

@@ -33,7 +33,7 @@ from onespp.scenes.description import (
 from . import plugins
 from .aligned import aligned
 from .appearance import Appearance
-from .variant import mi
+from .variant import check_variant, mi
 
 _SMALL = 0.125   # a scene that reaches less far has a unit of its own
 _SHEARED = 1e-4  # how far axes may be from perpendicular, as a cosine
@@ -51,9 +51,13 @@ class MitsubaScene:
             the world is `origin + unit * (its point in stage space)`.
         id_from_registry: UInt32 table, registry index of a shape -> object ID.
         frame: the frame it is set to.
+
+    Raises:
+        InputError: another Mitsuba variant was set since, as in a scene's file or a function of it.
     """
 
     def __init__(self, description: Scene, frame: float = 0) -> None:
+        check_variant()
         self.description = description
         self.origin = description.camera.world_from_camera_at(0)[:3, 3].copy()
         self.unit = _unit(description, self.origin)
@@ -78,12 +82,16 @@ class MitsubaScene:
             self._move(frame)
 
     def _move(self, frame: float) -> None:
-        for shape in self.description.shapes:
-            if shape.moves:
-                self._place(shape, shape.world_from_object_at(frame))
-            if callable(shape.emission):
-                key = f"{self._ids[shape.name]}.emitter.radiance.value"
-                self._parameters[key] = dr.opaque(mi.Color3f, shape.emission_at(frame))
+        shapes = self.description.shapes
+        # The author's code first: where it raises, or sets a variant, nothing has moved.
+        places = [(shape, shape.world_from_object_at(frame)) for shape in shapes if shape.moves]
+        lights = [(shape, shape.emission_at(frame)) for shape in shapes if callable(shape.emission)]
+        check_variant()
+        for shape, place in places:
+            self._place(shape, place)
+        for shape, radiance in lights:
+            key = f"{self._ids[shape.name]}.emitter.radiance.value"
+            self._parameters[key] = dr.opaque(mi.Color3f, radiance)
         self._parameters.update()
         self.frame = frame
 

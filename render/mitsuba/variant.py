@@ -17,9 +17,16 @@ VARIANTS = {"llvm": "llvm_ad_rgb", "cuda": "cuda_ad_rgb"}
 
 mi: Any = mitsuba  # its stubs describe no variant in particular
 
+
+def check_variant() -> None:
+    """InputError where the program, or a scene's file, set a variant that renders nothing here."""
+    if mi.variant() not in VARIANTS.values():
+        raise InputError(f"the Mitsuba variant is {mi.variant()}: leave out mitsuba.set_variant, "
+                         f"or set {' or '.join(VARIANTS.values())}")
+
+
 if mi.variant() is None:
     mi.set_variant(VARIANTS[backend.choose()])
-elif mi.variant() not in VARIANTS.values():
-    raise InputError(f"the Mitsuba variant is {mi.variant()}: use {' or '.join(VARIANTS.values())}")
+check_variant()
 
-__all__ = ["mi"]
+__all__ = ["check_variant", "mi"]

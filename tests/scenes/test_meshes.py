@@ -138,3 +138,15 @@ def test_paint_moves_all_uv_to_one_place_and_nothing_else():
 def test_impossible_mesh_is_refused_in_one_sentence(make, words):
     with pytest.raises(SceneError, match=words):
         make()
+
+
+def test_a_mesh_keeps_its_vertices_when_the_array_they_came_in_changes():
+    vertices = np.eye(3)
+    mesh = Mesh(vertices, np.array([[0, 1, 2]]))
+    vertices += 5
+    np.testing.assert_array_equal(mesh.vertices, np.eye(3))
+
+
+def test_complex_vertices_are_refused():
+    with pytest.raises(SceneError, match="mesh vertices are not real numbers"):
+        Mesh(np.eye(3) + 1j, np.array([[0, 1, 2]]))

@@ -1,5 +1,7 @@
 """Laws that every denoising method keeps, checked over the one table of methods."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -193,6 +195,45 @@ def test_images_of_the_wrong_shape_and_size_are_refused(name):
         method(frame, method.init(8, 7))
     with pytest.raises(InputError, match="empty"):
         method.init(0, 7)
+
+
+@each_method
+def test_a_call_with_something_else_than_a_frame_and_its_state_is_refused(name):
+    frame, method = make_frame(6, 7), build(name, SMALL[name])
+    for state in (None, (), object()):
+        with pytest.raises(InputError, match=r"a state that is not its own.*init\(height, width\)"):
+            method(frame, state)
+    things: tuple[Any, ...] = (None, frame["color"])
+    for thing in things:
+        with pytest.raises(InputError, match=f"called with a {type(thing).__name__}: give it a Fr"):
+            method(thing, method.init(6, 7))
+
+
+def test_a_state_that_reaches_less_far_than_the_filter_is_refused():
+    state = build("bilateral", {"radius": "2"}).init(6, 7)
+    with pytest.raises(InputError, match="not its own"):
+        build("bilateral", {"radius": "5"})(make_frame(6, 7), state)
+
+
+@each_method
+@pytest.mark.parametrize("size", [("16", 20), (16.0, 20.0), (None, 5)])
+def test_a_size_that_is_no_whole_number_is_refused(name, size):
+    with pytest.raises(InputError, match="use whole numbers"):
+        build(name, SMALL[name]).init(*size)
+
+
+@each_method
+def test_an_error_and_other_methods_in_between_change_no_result(name):
+    frames = [noisy(make_frame(9, 11, index=i), seed=i) for i in range(3)]
+    expected = run(name, *frames)
+    method, other = build(name, SMALL[name]), build("svgf", SMALL["svgf"])
+    state, others = method.init(9, 11), other.init(9, 11)
+    for frame in frames:
+        with pytest.raises(InputError, match="is 5x4"):
+            method(make_frame(4, 5), state)
+        _, others = other(frame, others)
+        image, state = method(frame, state)
+    np.testing.assert_array_equal(image, expected)
 
 
 @each_method

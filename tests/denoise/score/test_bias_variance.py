@@ -110,3 +110,12 @@ def test_renders_of_one_seed_or_of_something_else_are_refused(renders, tmp_path)
     other = FrameSequence.create(tmp_path / "else", manifest)
     with pytest.raises(InputError, match="has another scene"):
         split_errors([renders[0], other], ["mine"])
+
+
+def test_renders_that_do_not_fit_are_told_before_anything_is_scored(renders, tmp_path):
+    def progress(*what):
+        raise AssertionError(f"scored already: {what}")
+
+    same = render(tmp_path / "same", 0)
+    with pytest.raises(InputError, match="seeds are 0, 0"):
+        score(renders[0], progress=progress, seeds=[same])

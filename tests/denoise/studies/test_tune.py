@@ -86,6 +86,13 @@ def test_the_command_prints_settings_that_denoise_takes(call, folder, tmp_path):
     assert call("denoise", folder, "--method", "temporal", "--set", setting)[0] == 0
     code, _, err = call(*arguments, "--parameter", "beta")
     assert (code, "no parameter 'beta'" in err) == (2, True)
-    kept.write_text("[1]")
-    code, _, err = call(*arguments)
-    assert (code, "earlier search" in err) == (2, True)
+    for text in ("[1]", "[" * 100_000):
+        kept.write_text(text)
+        code, _, err = call(*arguments)
+        assert (code, "earlier search" in err) == (2, True)
+
+
+@pytest.mark.parametrize("out", ["/", "."])
+def test_a_folder_is_no_file_to_keep_a_search_in(call, folder, out):
+    code, _, err = call("tune", folder, "--method", "temporal", "--out", out)
+    assert (code, err.strip()) == (2, f"onespp: {out} cannot be read: it is not a file")

@@ -13,7 +13,7 @@ from onespp.denoise.report.html import write_report
 from onespp.denoise.report.terminal import caption
 from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
-from onespp.render.files.exr import write_exr
+from onespp.render.files.exr import read_exr, write_exr
 from onespp.render.files.manifest import Manifest
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.games202.convert import RESULTS, export_games202, import_games202
@@ -245,3 +245,21 @@ def test_a_missing_frame_is_told_when_denoising(call, box, tmp_path):
     (tmp_path / "s/frames/0001.exr").unlink()
     assert "there is no frame between 0 and 2" in call(
         "denoise", tmp_path / "s", "--method", "temporal")[1]
+
+
+def test_negative_radiance_is_told_of(box, tmp_path):
+    for path in [*box.glob("input/beauty_*"), *box.glob("reference_*")]:
+        planes, _ = read_exr(path, ("R", "G", "B"))
+        write(path, np.abs(np.stack([planes[c] for c in "RGB"], -1)))
+    assert not any("negative radiance" in note for note in taken(box, tmp_path / "plain")[1])
+    for path in (box / "input/beauty_1.exr", box / "reference_2.exr"):
+        planes, _ = read_exr(path, ("R", "G", "B"))
+        image = np.stack([planes[c] for c in "RGB"], -1)
+        image[2, 3, 1] = -0.5
+        write(path, image)
+    sequence, notes = taken(box, tmp_path / "negative")
+    assert sequence.read_frame(1)["color"][2, 3, 1] == -0.5
+    for what, frame in (("beauty", 1), ("reference", 2)):
+        told = [note for note in notes if f"the {what} has negative radiance" in note]
+        assert told == [f"the {what} has negative radiance in frames {frame}: methods take it as "
+                        "it is, scores as black"]
