@@ -13,7 +13,7 @@ demo: .venv/installed
 	@echo "Look at data/demo/pictures."
 
 test: .venv/installed-dev lint
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2
 
 pythons: .venv/installed-dev
 	$(BIN)/python .ci/pythons.py
