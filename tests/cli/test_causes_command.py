@@ -82,7 +82,9 @@ def test_by_cause_prints_a_table_of_each(call, sequence):
     for heading in ("disoccluded", "moving", "2-3 frames", "of all pixels"):
         assert heading in out
     assert "background" not in out  # there is none
-    assert max(map(len, out.splitlines())) <= 100
+    tables, wrote = out.split("wrote ")
+    assert str(sequence.folder) in wrote  # a line as long as the path
+    assert max(map(len, tables.splitlines())) <= 100
 
 
 def test_by_cause_without_guides_says_what_it_takes(call, tmp_path):
