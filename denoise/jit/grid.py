@@ -30,6 +30,7 @@ import numpy as np
 
 from onespp.render.errors import InputError
 from onespp.render.host import backend
+from onespp.render.host.aligned import aligned
 
 from .arrays import Float
 from .structure import arrays_of
@@ -135,10 +136,7 @@ class Stencil:
     def table(self, values: np.ndarray) -> Float:
         """A small array for packed gathers, in memory aligned to 64 bytes: otherwise Dr.Jit
         silently gathers word by word, and a step records again when the alignment changes."""
-        memory = np.empty(values.size + _LINE, np.float32)
-        start = -memory.ctypes.data % (4 * _LINE) // 4
-        memory[start:start + values.size] = values.ravel()
-        return self.Float(memory[start:start + values.size])
+        return aligned(self.Float, np.asarray(values, np.float32))
 
     def pack(self, words: Sequence[Float]) -> Float:
         """A few numbers a lane, side by side, for packed gathers. Traced, not evaluated."""

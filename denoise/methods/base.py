@@ -62,8 +62,8 @@ class OnLanes(Generic[State]):
         color, surface = read_color(frame, state.stencil), read_surface(frame, state.stencil)
         result, after = self.on_lanes(frame, color, surface, state)
         image = state.stencil.image(result)
-        if not (frame["color"] < 0).any():  # where light is negative, so may a mean of it be
-            repay(image, frame["id"])
+        if not image.min() >= 0 and not (frame["color"] < 0).any():
+            repay(image, frame["id"])  # where light is negative, so may a mean of it be
         return image, after
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,

@@ -19,6 +19,7 @@ from typing import Any, cast
 import drjit as dr
 import numpy as np
 
+from onespp.render.host.aligned import aligned
 from onespp.scenes.description import (
     Cylinder,
     Disk,
@@ -31,7 +32,6 @@ from onespp.scenes.description import (
 )
 
 from . import plugins
-from .aligned import aligned
 from .appearance import Appearance
 from .variant import check_variant, mi
 

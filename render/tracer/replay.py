@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import drjit as dr
 import numpy as np
 
-from onespp.render.mitsuba.aligned import aligned
+from onespp.render.host.aligned import aligned
 from onespp.render.mitsuba.variant import mi
 
 from .camera_rays import camera_matrices

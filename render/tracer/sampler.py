@@ -15,7 +15,7 @@ from typing import ClassVar, Protocol
 import drjit as dr
 import numpy as np
 
-from onespp.render.mitsuba.aligned import aligned
+from onespp.render.host.aligned import aligned
 from onespp.render.mitsuba.variant import mi
 
 from . import bluenoise
