@@ -53,7 +53,7 @@ class MethodScorer:
 
     def see(self, number: int, after: int | None, image: np.ndarray, ground: FrameTruth,
             ms: float | None, metrics: Iterable[str]) -> None:
-        """MethodScorer a frame.
+        """Score a frame.
 
         Args:
             after: number of the frame before it in the sequence. image: (h, w, 3) linear radiance.

@@ -41,16 +41,26 @@ _UNKNOWN = "unknown"
 
 @dataclass(frozen=True)
 class Reference:
-    """FrameTruth truth of a frame.
+    """Ground truth of a frame.
 
     Attributes:
         color: (h, w, 3) float32, linear radiance. variance: (h, w, 3) float32, of that mean.
         spp: samples a pixel. Of a reference from elsewhere spp is None and the variance NaN.
+        parts: (4, h, w, 3) float32, linear radiance: means of four independent sets of spp / 4
+            samples, whose mean `color` is. None of a reference of the old kind, or from elsewhere.
     """
 
     color: np.ndarray
     variance: np.ndarray
     spp: int | None
+    parts: np.ndarray | None = None
+
+    @property
+    def halves(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Two independent halves, the means of two parts each; None where there are no parts."""
+        if self.parts is None:
+            return None
+        return (self.parts[0] + self.parts[1]) / 2, (self.parts[2] + self.parts[3]) / 2
 
 
 @dataclass(frozen=True)
