@@ -19,7 +19,7 @@ import jinja2
 import numpy as np
 
 from onespp.denoise.score.scorecard import INPUT, Scores
-from onespp.render.channels import IDS, RADIANCE
+from onespp.render.channels import CHANNELS, Display
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import all_or_none, write_text
 from onespp.render.files.sequence import FrameSequence
@@ -34,7 +34,7 @@ from .terminal import caption
 EDGES = np.logspace(-4, 0, 49)
 """Edges of the bins of the histogram; errors below the first are in the first bin."""
 
-_COLOURS = ("unshadowed", "specular", "albedo")  # packed as radiance is
+_KINDS = {Display.LIGHT: packed.RADIANCE, Display.OBJECT: packed.WHOLE}
 
 _SCRIPTS = ("format.js", "work.js", "pixels.js", "plots.js", "charts.js", "view.js",
             "readout.js", "viewer.js", "controls.js", "page.js")
@@ -101,9 +101,7 @@ def _images(sequence: FrameSequence, scores: Scores, frame: int,
     """(where it belongs, image, how it is stored) of all images of a frame."""
     images = sequence.read_frame(frame, ("color", *channels)).images
     for name, image in images.items():
-        kind = (packed.WHOLE if name in IDS else
-                packed.RADIANCE if name in (*RADIANCE, *_COLOURS) else packed.GUIDE)
-        yield f"frame/{name}", image, kind
+        yield f"frame/{name}", image, _KINDS.get(CHANNELS[name].display, packed.GUIDE)
     if sequence.has_reference(frame):
         yield "reference", sequence.read_reference(frame).color, packed.RADIANCE
     for name in scores.methods:
@@ -123,9 +121,9 @@ def _measure(images: dict[str, np.ndarray], histograms: dict[str, np.ndarray],
         for name, error in zip(judged, display_errors(judged.values(), images["reference"])):
             inside = np.clip(error, EDGES[0], EDGES[-1])
             histograms[name] += np.histogram(inside, EDGES)[0]
-    for name in ("depth", "position", "hit_distance", "blocker_distance", "light"):
+    for name, channel in CHANNELS.items():
         image = images.get(f"frame/{name}")
-        if image is not None:
+        if image is not None and channel.display is Display.RANGE:
             values = image[np.isfinite(image) & (image != 0)]
             if values.size:
                 low, high = ranges.get(name, (np.inf, -np.inf))

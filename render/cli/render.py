@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from onespp.render.channels import REPLAY
+from onespp.render.channels import OFFERED, REPLAY
 from onespp.render.errors import InputError
 from onespp.render.files.frame_ranges import parse_frames
 from onespp.render.files.lock import writing
@@ -15,7 +15,7 @@ from onespp.render.host.memory import require_memory
 from onespp.scenes import catalog
 
 from .arguments import parse_size
-from .options import OFFERED, overwrite_option, render_options, use
+from .options import overwrite_option, render_options, use
 from .terminal import command_line, progress
 
 

@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from onespp.render.channels import CHANNELS
+from onespp.render.channels import CHANNELS, HALF
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 
@@ -151,9 +151,10 @@ class FrameSequence:
                                  f"(it has {', '.join(self.manifest.channels)})")
         matrices = self.read_matrices(i)
         images = self._read(self._path("frames", i), names)
-        if "id" in images:
-            images["id"] = object_ids(self._path("frames", i), images["id"],
-                                      len(self.manifest.objects))
+        for name in images:
+            if CHANNELS[name].is_id:
+                images[name] = object_ids(self._path("frames", i), name, images[name],
+                                          len(self.manifest.objects))
         return Frame(i, images, *matrices)
 
     def read_matrices(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -293,9 +294,9 @@ class FrameSequence:
             if image.shape != expected:
                 raise InputError(f"{path} could not be written because '{name}' has shape "
                                  f"{image.shape}, expected {expected}")
-            if row.half:
+            if row.stored == HALF:
                 image = np.clip(image, -_HALF_MAX, _HALF_MAX)
-            image = image.astype(np.float16 if row.half else np.float32)
+            image = image.astype(np.float16 if row.stored == HALF else np.float32)
             planes.update(zip(row.exr, np.moveaxis(np.atleast_3d(image), 2, 0)))
         write_exr(path, planes, header, durable)
 
@@ -309,14 +310,14 @@ class FrameSequence:
         return int(text)
 
 
-def object_ids(path: Path, image: np.ndarray, count: int) -> np.ndarray:
-    """The ID image of a file as int32.
+def object_ids(path: Path, name: str, image: np.ndarray, count: int) -> np.ndarray:
+    """The image `name` of a file, of object IDs, as int32.
 
     Kernels index with it unchecked, so all but the whole numbers -1 to count - 1 are refused here.
     """
     if not ((image >= -1) & (image < count) & (image == np.floor(image))).all():
-        raise InputError(f"{path} has object IDs other than the whole numbers -1 to {count - 1}: "
-                         "make it again")
+        raise InputError(f"{path} has object IDs other than the whole numbers -1 to {count - 1} in "
+                         f"'{name}': make it again")
     return image.astype(np.int32)
 
 

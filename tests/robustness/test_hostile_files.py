@@ -8,6 +8,7 @@ import os
 import struct
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -341,9 +342,10 @@ def test_ids_that_point_at_no_object_are_not_read(tmp_path):
     """Kernels gather by ID without a check."""
     sequence = small_sequence(tmp_path)
     path = tmp_path / "frames/0000.exr"
-    for value in (3, -2, 0.5, np.nan, 1e30):
-        planes = {name: np.array(image) for name, image in read_exr(path)[0].items()}
-        planes["ID"][4, 4] = value
+    good, _ = read_exr(path)
+    for plane, value in product(("ID", "light.ID"), (3, -2, 0.5, np.nan, 1e30)):
+        planes = {name: np.array(image) for name, image in good.items()}
+        planes[plane][4, 4] = value
         write_exr(path, planes)
         assert "object IDs other than the whole numbers -1 to 2" in sentence(sequence.read_frame, 0)
 

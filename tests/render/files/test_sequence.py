@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from onespp.render.channels import CHANNELS, HALF
 from onespp.render.errors import InputError
 from onespp.render.files.exr import read_header
 from onespp.render.files.frame_ranges import format_frames, parse_frames
@@ -29,13 +30,13 @@ from tests.support.small_sequence import (
 )
 
 
-def test_a_frame_comes_back_exactly_and_albedo_to_half(tmp_path):
+def test_a_frame_comes_back_exactly_and_what_is_stored_as_half_to_half(tmp_path):
     sequence = small_sequence(tmp_path / "s")
     frame, back = small_frame(1), FrameSequence.open(tmp_path / "s").read_frame(1)
     for name, image in frame.images.items():
         assert back[name].dtype == image.dtype
         assert back[name].shape == image.shape
-        expected = image.astype(np.float16) if name == "albedo" else image
+        expected = image.astype(np.float16) if CHANNELS[name].stored == HALF else image
         np.testing.assert_array_equal(back[name], expected, err_msg=name)
     np.testing.assert_array_equal(back.camera_from_world, frame.camera_from_world)
     np.testing.assert_array_equal(back.screen_from_world, frame.screen_from_world)
