@@ -87,7 +87,15 @@ _ROWS = (
     Channel("id", ("ID",), False, -1.0,
             "object ID: rank of the shape's name in sorted order; -1: nothing there"),
     Channel("variance", _rgb("variance"), False, 0.0,
-            "variance of the mean that `color` holds, radiance^2 (references only)"),
+            "variance of the mean that `color` holds, radiance^2 (older references only)"),
+    Channel("half", _rgb("half"), True, 0.0,
+            "first half of a reference's samples minus `color`; `color` minus this is the second "
+            "half (references only)"),
+    Channel("quarter0", _rgb("quarter0"), True, 0.0,
+            "first quarter of a reference's samples minus the first half; that half minus this is "
+            "the second quarter (likewise)"),
+    Channel("quarter1", _rgb("quarter1"), True, 0.0,
+            "third quarter minus the second half; that half minus this is the fourth (likewise)"),
 )
 
 CHANNELS = MappingProxyType({row.name: row for row in _ROWS})
@@ -99,5 +107,5 @@ GLOSS = ("specular", "hit_distance", "hit_id", "roughness")
 REPLAY = ("replay", "replay_before")
 GBUFFER = ("albedo", "normal", "position", "depth", "id")
 FRAME = RADIANCE + GBUFFER
-REFERENCE = ("color", "variance")
+REFERENCE = ("color", "half", "quarter0", "quarter1")
 IDS = ("id", "light_id", "blocker_id", "hit_id")  # of objects

@@ -50,7 +50,8 @@ def _judge_hard(name: str, out: Path, reference_spp: int, advance: Callable[[flo
     """Rows of one hard scene; `advance` is told the share that is done."""
     from onespp.denoise.catalog import METHODS
     from onespp.denoise.studies.hard_scenes import judge
-    from onespp.render.job import RenderJob, kept_references, render_sequence
+    from onespp.render.job import RenderJob, render_sequence
+    from onespp.render.references import reference_notes
     from onespp.scenes.hard import HARD
 
     hard = HARD[name]
@@ -59,10 +60,15 @@ def _judge_hard(name: str, out: Path, reference_spp: int, advance: Callable[[flo
                     reference_spp=reference_spp)
     needed = {channel for method in METHODS.values() for channel in method.needs}
     job = replace(job, channels=tuple(dict.fromkeys((*job.channel_names(), *sorted(needed)))))
-    sequence = render_sequence(job, out / name, on_references=lambda done, _: advance(
-        0.5 * done / scene.frames))
-    if kept := kept_references(sequence, sequence.frames, reference_spp):
-        click.echo(f"{name}: {kept}", err=True)
+    stages: dict[str, float] = {}  # frames, then references: taken for as much work each
+
+    def report(done: float, total: float, what: str, /) -> None:
+        stages[what] = done / total
+        advance(0.25 * sum(stages.values()))
+
+    sequence = render_sequence(job, out / name, report=report)
+    for note in reference_notes(sequence, sequence.frames, reference_spp):
+        click.echo(f"{name}: {note}", err=True)
     judged = iter(range(1, len(METHODS) + 2))
     return judge(sequence, name, hard.event, hard.diffuse,
                  lambda: advance(0.5 + 0.5 * next(judged) / (len(METHODS) + 1)))
