@@ -123,7 +123,15 @@ _ROWS = (
             Display.UNIT, -1.0,
             "luminance that the same samples had in that frame; -1: no sample"),
     Channel("variance", Group.TRUTH, _rgb("variance"), FLOAT, Display.LIGHT, 0.0,
-            "variance of the mean that `color` holds, radiance^2 (references only)"),
+            "variance of the mean that `color` holds, radiance^2 (older references only)"),
+    Channel("half", Group.TRUTH, _rgb("half"), HALF, Display.LIGHT, 0.0,
+            "first half of a reference's samples minus `color`; `color` minus this is the second "
+            "half (references only)"),
+    Channel("quarter0", Group.TRUTH, _rgb("quarter0"), HALF, Display.LIGHT, 0.0,
+            "first quarter of a reference's samples minus the first half; that half minus this is "
+            "the second quarter (likewise)"),
+    Channel("quarter1", Group.TRUTH, _rgb("quarter1"), HALF, Display.LIGHT, 0.0,
+            "third quarter minus the second half; that half minus this is the fourth (likewise)"),
 )
 
 CHANNELS = MappingProxyType({row.name: row for row in _ROWS})
@@ -145,3 +153,5 @@ FRAME = channels_of(Group.RADIANCE, Group.GUIDES)
 """What can be said of every scene."""
 OFFERED = channels_of(*(group for group in Group if group is not Group.TRUTH))
 """What a frame can carry."""
+REFERENCE = ("color", "half", "quarter0", "quarter1")
+"""What the file of a reference has."""

@@ -23,7 +23,7 @@ from onespp.render.channels import CHANNELS, Display
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import all_or_none, write_text
 from onespp.render.files.sequence import FrameSequence
-from onespp.render.progress import Progress
+from onespp.render.progress import Progress, silent
 
 from . import page_images as packed
 from .contact_sheets import display_errors
@@ -41,12 +41,12 @@ _SCRIPTS = ("format.js", "work.js", "pixels.js", "plots.js", "charts.js", "view.
 
 
 def write_report(sequence: FrameSequence, scores: Scores, channels: Iterable[str] | None = None,
-                 progress: Progress | None = None, command: str = "") -> Path:
+                 progress: Progress = silent, command: str = "") -> Path:
     """Write `report/` into the sequence's folder; the path of its index.html.
 
     Args:
         channels: of the frames to show beside colour; default: all that there are.
-        progress: called with (done, total, what). command: the command line, to be shown.
+        progress: counts frames. command: the command line, to be shown.
 
     Raises:
         InputError: an unknown channel, or a file that cannot be read or written.
@@ -71,8 +71,7 @@ def write_report(sequence: FrameSequence, scores: Scores, channels: Iterable[str
             packing = [pool.submit(write, image) for image in images]
             _measure(known, histograms, ranges)
             written |= {part.result() for part in packing}
-            if progress:
-                progress(n + 1, len(scores.frames), "report")
+            progress(n + 1, len(scores.frames), "report")
     shares = {name: [float(f"{x:.4g}") for x in counts / counts.sum()]
               for name, counts in histograms.items() if counts.sum()}
     data = page_data(sequence, scores, shown, ranges, shares, EDGES)

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from onespp.render.errors import InputError
 from onespp.render.files import atomic
 from onespp.render.files.exr import read_exr, write_exr
-from onespp.render.files.sequence import FrameSequence
+from onespp.render.files.sequence import FrameSequence, Reference
 from tests.support.places import ROOT
 from tests.support.small_sequence import (
     HEIGHT,
@@ -357,6 +357,17 @@ def test_a_reference_that_does_not_say_its_samples_is_refused(tmp_path):
     for header in ({}, {"spp": "0"}, {"spp": "many"}, {"spp": "-3"}):
         write_exr(tmp_path / "reference/0000.exr", planes, header)
         assert "samples a pixel" in sentence(sequence.read_reference, 0)
+
+
+def test_a_reference_that_lacks_a_part_is_refused(tmp_path):
+    sequence = small_sequence(tmp_path)
+    parts = np.random.default_rng(0).random((4, *sequence.size, 3), np.float32)
+    sequence.write_reference(0, Reference.of_parts(parts, 64))
+    path = tmp_path / "reference/0000.exr"
+    planes = {name: np.array(image) for name, image in read_exr(path)[0].items()}
+    for missing in ("half.R", "quarter0.G", "quarter1.B", "R"):
+        write_exr(path, {n: p for n, p in planes.items() if n != missing}, {"spp": "64"})
+        assert f"lacks the channel {missing}" in sentence(sequence.read_reference, 0)
 
 
 def test_a_damaged_partial_reference_is_named(tmp_path):
