@@ -25,7 +25,7 @@ from onespp.denoise.catalog import METHODS, PEERS, build
 from onespp.denoise.methods.outliers import RemoveOutliers
 from onespp.denoise.metrics.table import MEASURES
 from onespp.denoise.score.causes import CAUSES, HISTORIES
-from onespp.render.channels import CHANNELS, HALF
+from onespp.render.channels import CHANNELS
 from onespp.scenes import catalog
 from onespp.scenes.hard import HARD
 
@@ -162,7 +162,7 @@ def channels() -> str:
         ("group", "channel", "in the EXR file", "stored as", "background",
          "meaning, space and unit"),
         ((c.group.name.lower(), f"`{c.name}`", " ".join(f"`{name}`" for name in c.exr),
-          "half" if c.stored == HALF else "float", f"{c.background:g}", c.about)
+          c.stored.value.strip(), f"{c.background:g}", c.about)
          for c in CHANNELS.values()))
 
 

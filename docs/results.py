@@ -177,7 +177,7 @@ def all_methods(sequence: FrameSequence) -> dict[str, Method]:
     """Every method, and every peer that can run here, that the sequence has the channels of."""
     names = [*METHODS, *(name for name, peer in PEERS.items() if peer.available())]
     return {name: method for name in names
-            if set((method := build(name)).needs) <= set(sequence.manifest.channels)}
+            if set((method := build(name)).needs) <= set(sequence.channels)}
 
 
 def denoise(sequence: FrameSequence, methods: Mapping[str, Method], again: bool) -> None:

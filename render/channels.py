@@ -10,9 +10,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 from types import MappingProxyType
-from typing import Literal
 
-FLOAT, HALF, OBJECT_ID = "float32", "float16", "int32"
+
+class Stored(Enum):
+    """The type in the file. In memory all is float32, but for object IDs, which are int32."""
+
+    FLOAT = "float, half with `--half`"
+    EXACT = "float"
+    HALF = "half"
+    OBJECT_ID = "float "
+
+
+FLOAT, EXACT, HALF, OBJECT_ID = Stored.FLOAT, Stored.EXACT, Stored.HALF, Stored.OBJECT_ID
 
 
 class Group(Enum):
@@ -46,8 +55,8 @@ class Channel:
         group: which channels it comes with (`channels_of`).
         exr: channel names in the file, in component order; their number is the number of
             components. One component is an (h, w) image, more are (h, w, c).
-        stored: type in the file. HALF loses nothing that matters there; in memory that is
-            float32. OBJECT_ID is int32 in memory and float32, which viewers expect, in the file.
+        stored: type in the file. HALF loses nothing that matters there; EXACT is what
+            reprojection compares; OBJECT_ID is float32 there, which viewers expect.
         display: how pictures show it.
         background: value of a pixel whose ray hits nothing.
         about: meaning, space and unit.
@@ -56,7 +65,7 @@ class Channel:
     name: str
     group: Group
     exr: tuple[str, ...]
-    stored: Literal["float32", "float16", "int32"]
+    stored: Stored
     display: Display
     background: float
     about: str
@@ -68,7 +77,11 @@ class Channel:
     @property
     def is_id(self) -> bool:
         """Whether its values are object IDs: -1, or the index of an object."""
-        return self.stored == OBJECT_ID
+        return self.stored is OBJECT_ID
+
+    def is_half(self, half: bool) -> bool:
+        """Whether a file has it in half precision, in a sequence with (or without) `--half`."""
+        return self.stored is HALF or (half and self.stored is FLOAT)
 
 
 def _rgb(layer: str) -> tuple[str, ...]:
@@ -89,9 +102,9 @@ _ROWS = (
     Channel("normal", Group.GUIDES, ("N.X", "N.Y", "N.Z"), FLOAT, Display.AXES, 0.0,
             "shading normal, normal and bump maps included, world space, unit length, facing the "
             "camera"),
-    Channel("position", Group.GUIDES, ("P.X", "P.Y", "P.Z"), FLOAT, Display.RANGE, 0.0,
+    Channel("position", Group.GUIDES, ("P.X", "P.Y", "P.Z"), EXACT, Display.RANGE, 0.0,
             "first hit, world space, scene units (float32: see `depth` far from the origin)"),
-    Channel("depth", Group.GUIDES, ("Z",), FLOAT, Display.RANGE, 0.0,
+    Channel("depth", Group.GUIDES, ("Z",), EXACT, Display.RANGE, 0.0,
             "camera-space z of the first hit (not distance along the ray), scene units, > 0"),
     Channel("id", Group.GUIDES, ("ID",), OBJECT_ID, Display.OBJECT, -1.0,
             "object ID: rank of the shape's name in sorted order; -1: nothing there"),
@@ -122,7 +135,7 @@ _ROWS = (
     Channel("replay_before", Group.REPLAY, ("before.direct", "before.indirect"), FLOAT,
             Display.UNIT, -1.0,
             "luminance that the same samples had in that frame; -1: no sample"),
-    Channel("variance", Group.TRUTH, _rgb("variance"), FLOAT, Display.LIGHT, 0.0,
+    Channel("variance", Group.TRUTH, _rgb("variance"), EXACT, Display.LIGHT, 0.0,
             "variance of the mean that `color` holds, radiance^2 (older references only)"),
     Channel("half", Group.TRUTH, _rgb("half"), HALF, Display.LIGHT, 0.0,
             "first half of a reference's samples minus `color`; `color` minus this is the second "
@@ -153,5 +166,8 @@ FRAME = channels_of(Group.RADIANCE, Group.GUIDES)
 """What can be said of every scene."""
 OFFERED = channels_of(*(group for group in Group if group is not Group.TRUTH))
 """What a frame can carry."""
+TRAINING = tuple(name for name in OFFERED if name not in (
+    "color", "position", "hit_distance", "hit_id", *REPLAY))
+"""What methods and training read, without what follows from it (`render/derived.py`)."""
 REFERENCE = ("color", "half", "quarter0", "quarter1")
 """What the file of a reference has."""

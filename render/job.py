@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from onespp.render.channels import TRAINING
 from onespp.render.files.json_file import checked
 from onespp.render.files.manifest import Manifest, first_difference
 from onespp.render.files.sequence import FrameSequence, another
@@ -34,7 +35,9 @@ class RenderJob:
             parts can share.
         antialias: the reference is box-filtered over each pixel instead of through its centre.
         channels: what each frame carries, see `render/channels.py`; None: all that says something
-            about this scene. added: channels beside those.
+            about this scene. added: channels beside those. training: of those by default, only
+            what methods read and does not follow from the rest.
+        half: store radiance and guides in half precision.
         direct, sampler: the estimator of direct light and the random numbers of the frames, see
             `render/renderer.py`. (References are always resampled and Sobol.)
         command: the command line, for the manifest.
@@ -52,6 +55,8 @@ class RenderJob:
     sampler: str = "zsobol"
     command: str = ""
     added: Sequence[str] = ()
+    training: bool = False
+    half: bool = False
 
     @cached_property
     def renderer(self) -> Renderer:
@@ -66,6 +71,8 @@ class RenderJob:
     def channel_names(self) -> tuple[str, ...]:
         """The channels asked for, or else what the renderer has to say about the scene."""
         names = self.renderer.channels if self.channels is None else self.channels
+        if self.training:
+            names = [name for name in names if name in TRAINING]
         return tuple(dict.fromkeys((*names, *self.added)))
 
     def manifest(self) -> Manifest:
@@ -77,7 +84,7 @@ class RenderJob:
             seed=self.seed, reference_spp=self.whole_spp, max_depth=self.scene.max_depth,
             direct=self.direct, sampler=self.sampler,
             reference_filter="box" if self.antialias else "centre",
-            channels=self.channel_names(), objects=self.scene.object_names,
+            channels=self.channel_names(), half=self.half, objects=self.scene.object_names,
             device=backend.choose(), machine=machine(backend.choose()),
             versions=versions("mitsuba", "drjit", "numpy"),
             commands=(self.command,) if self.command else (),

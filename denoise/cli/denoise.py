@@ -73,7 +73,7 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
     denoisers = {method + (OUTLIERS if outliers is not None else "") if name is None else name:
                  build(method, pairs(settings), outliers, note) for method in chosen}
     for name, denoiser in denoisers.items():
-        _check_replay(name, denoiser.needs, sequence.manifest.channels, str(folder))
+        _check_replay(name, denoiser.needs, sequence.channels, str(folder))
     frames = sum(map(sequence.has_frame, sequence.frames))
     if not frames:
         raise InputError(f"{folder} has no frames yet: render some first")
@@ -111,7 +111,7 @@ def _check_replay(name: str, needs: Iterable[str], channels: Iterable[str], who:
 
 def _what_to_know(sequence: FrameSequence, default: bool) -> Iterator[str]:
     """What a user may not know of these frames, a sentence each; `default`: of the method, too."""
-    if default and not set(SPLIT) <= set(sequence.manifest.channels):
+    if default and not set(SPLIT) <= set(sequence.channels):
         from onespp.denoise.catalog import PEERS
 
         install = "" if all(PEERS[name].available() for name in BETTER_ON_PLAIN) else (

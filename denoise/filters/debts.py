@@ -49,22 +49,18 @@ def repay(image: np.ndarray, id_: np.ndarray) -> np.ndarray:
     own[(own < 0) & ((own >= least[:, None]) | (own == -np.inf))] = 0
     pixels[at] = own
     at = at[(own < 0).any(axis=1)]
-    given = np.zeros(pixels.shape, np.float32)
     for i in range(LEVELS):
         if not len(at):
             break
-        at = _ask_around(pixels, given, ids, image.shape[1], at, 1 << i)
+        at = _ask_around(pixels, ids, image.shape[1], at, 1 << i)
     if len(at):
         _ask_everyone(pixels, ids, at)
     return image
 
 
-def _ask_around(pixels: np.ndarray, given: np.ndarray, ids: np.ndarray, width: int, at: np.ndarray,
+def _ask_around(pixels: np.ndarray, ids: np.ndarray, width: int, at: np.ndarray,
                 spacing: int) -> np.ndarray:
-    """One level for the debtors `at`; those that still owe something.
-
-    given: zeros like `pixels`, before and after.
-    """
+    """One level for the debtors `at`; those that still owe something."""
     own, offered = pixels[at], np.zeros((len(at), 3), np.float32)
     taps = list(_taps(ids, width, at, spacing))
     for who, where in taps:
@@ -74,12 +70,13 @@ def _ask_around(pixels: np.ndarray, given: np.ndarray, ids: np.ndarray, width: i
                     np.float32(LARGEST_RATE))
     left = np.where(rate < LARGEST_RATE, 0, rate * offered - debt)
     pixels[at] = np.where(debt > 0, left, own)
+    asked, index = np.unique(np.concatenate([where for _, where in taps]), return_inverse=True)
+    given, end = np.zeros((len(asked), 3), np.float32), 0
     for who, where in taps:
-        given[where] += rate[who]  # a tap meets no pixel twice
-    where = np.concatenate([where for _, where in taps])
-    rows = np.take(pixels, where, axis=0)
-    pixels[where] = np.where(rows > 0, rows * (1 - np.take(given, where, axis=0)), rows)
-    given[where] = 0
+        start, end = end, end + len(where)
+        given[index[start:end]] += rate[who]  # a tap meets no pixel twice
+    rows = np.take(pixels, asked, axis=0)
+    pixels[asked] = np.where(rows > 0, rows * (1 - given), rows)
     return at[(pixels[at] < 0).any(axis=1)]
 
 

@@ -84,14 +84,14 @@ def write_report(sequence: FrameSequence, scores: Scores, channels: Iterable[str
 
 
 def _channels(sequence: FrameSequence, wanted: Iterable[str] | None) -> list[str]:
-    there = [name for name in sequence.manifest.channels if name != "color"]
+    there = [name for name in sequence.channels if name != "color"]
     if wanted is None:
         return there
     names = list(wanted)
     for name in names:
         if name not in there and name != "color":
             raise InputError(f"{sequence.folder} lacks the channel '{name}' (it has "
-                             f"{', '.join(sequence.manifest.channels)})")
+                             f"{', '.join(sequence.channels)})")
     return [name for name in there if name in names]
 
 
@@ -143,7 +143,7 @@ def render_page(sequence: FrameSequence, scores: Scores, data: dict, command: st
         scores=scores, about=sequence.manifest.about, tiles=highlights(scores),
         caption=caption(scores), columns=columns, rows=rows, best=best_cells(scores, columns),
         made=provenance(sequence, scores, command), style=text("page.css"),
-        glossy="roughness" in sequence.manifest.channels,
+        glossy="roughness" in sequence.channels,
         script="\n".join(text(name) for name in _SCRIPTS),
         # "<" would let a name in the data end the element that holds it.
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"))

@@ -44,7 +44,7 @@ def time_methods(sequence: FrameSequence, methods: Mapping[str, Method], frames:
         raise InputError(f"there is nothing to time in {sequence.folder}: "
                          "it takes frames, methods, and a round")
     needs = {c for method in methods.values()
-             for c in channels_read(method, sequence.manifest.channels)}
+             for c in channels_read(method, sequence.channels)}
     loaded = [sequence.read_frame(i, sorted(needs)) for i in numbers]
     names = list(methods)
     states = {name: method.init(*sequence.size) for name, method in methods.items()}

@@ -141,7 +141,7 @@ def denoise_sequence(sequence: FrameSequence, method: Method, name: str,
               machine=machine(backend.choose()), command=command)
     _remove_stale(sequence, name, run)
     frames = [i for i in sequence.frames if sequence.has_frame(i)]
-    used = channels_read(method, sequence.manifest.channels)
+    used = channels_read(method, sequence.channels)
     state = method.init(*sequence.size)
     try:
         with Threads(1) as threads:

@@ -58,7 +58,7 @@ def ablate(sequence: FrameSequence, methods: dict[str, Method],
     scorers = {name: MethodScorer() for name in methods}
     states: dict[str, Any] = {name: m.init(*sequence.size) for name, m in methods.items()}
     channels = dict.fromkeys(c for m in methods.values()
-                             for c in channels_read(m, sequence.manifest.channels))
+                             for c in channels_read(m, sequence.channels))
     before, ground = {b: a for a, b in pairwise(sequence.frames)}, None
     for done, number in enumerate(frames):
         last = ground if done and frames[done - 1] == before.get(number) else None

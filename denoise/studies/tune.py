@@ -53,7 +53,7 @@ def read_case(sequence: FrameSequence, method: Method) -> Case:
     if not numbers:
         raise InputError(f"{sequence.folder} has no reference to tune on: "
                          "render one with --reference-spp")
-    channels = channels_read(method, sequence.manifest.channels)
+    channels = channels_read(method, sequence.channels)
     return Case(sequence.folder.name,
                 [sequence.read_frame(i, list(channels)) for i in numbers],
                 [srgb_from_linear(sequence.read_reference(i).color) for i in numbers])

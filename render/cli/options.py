@@ -44,7 +44,11 @@ def render_options(command):
         click.option("--channels", metavar="NAMES",
                      help=f"What frames carry, of {', '.join(OFFERED)}; default those that "
                           "say something about the scene; +NAMES: beside those, as +gradient for "
-                          f"{' and '.join(REPLAY)}."),
+                          f"{' and '.join(REPLAY)}; training: what methods read, without what "
+                          "follows from the rest."),
+        click.option("--half", is_flag=True,
+                     help="Store radiance and guides, but not depth, in half precision: relative "
+                          "error at most 0.05 %."),
         click.option("--direct", default="resampled", show_default=True,
                      type=click.Choice(["mis", "resampled"]),
                      help="Direct light at the first hit: as Mitsuba's path, or by resampling all "

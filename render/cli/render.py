@@ -35,7 +35,7 @@ def render(scene: str, out: Path | None, device: str, threads: int | None, **opt
 
 
 def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: str | None, seed: int,
-              reference_spp: int | None, antialias: bool, channels: str | None,
+              reference_spp: int | None, antialias: bool, channels: str | None, half: bool,
               direct: str, sampler: str, overwrite: bool) -> FrameSequence:
     """Do what the options of a command ask."""
     scene = catalog.load(scene_name)
@@ -49,7 +49,7 @@ def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: st
     from onespp.render.references import reference_notes
 
     job = RenderJob(scene, numbers, height, width, seed, reference_spp, antialias, names,
-                    direct, sampler, command_line(), added)
+                    direct, sampler, command_line(), added, channels == "training", half)
     out = out or Path("data") / scene.name
     with writing(out, "render", alone=overwrite), progress() as report:
         sequence = render_sequence(job, out, overwrite=overwrite, report=report)
@@ -60,7 +60,7 @@ def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: st
 
 def channel_names(text: str | None) -> tuple[tuple[str, ...] | None, tuple[str, ...]]:
     """The channels asked for, None for the default ones, and those to add to them."""
-    if text is None:
+    if text in (None, "training"):
         return None, ()
     added = text.startswith("+")
     names = [name.strip() for name in text[added:].split(",") if name.strip()]

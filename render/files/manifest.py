@@ -72,6 +72,7 @@ class Manifest(JsonFile):
     direct: Name | None = "mis"
     sampler: Name | None = "pcg"
     channels: Annotated[tuple[str, ...], Field(min_length=1)]
+    half: bool = False
     objects: Annotated[tuple[Name, ...], Field(min_length=1)]
     fingerprint: str = ""
     later: dict[int, str] = Field(default_factory=dict)
@@ -103,7 +104,7 @@ class Manifest(JsonFile):
 
 # What two manifests of the same sequence have in common. The rest may change from run to run.
 _IDENTITY = ("source", "scene", "fingerprint", "width", "height", "fps", "seed", "spp",
-             "max_depth", "direct", "sampler", "channels", "objects")
+             "max_depth", "direct", "sampler", "channels", "half", "objects")
 
 
 def first_difference(a: Manifest, b: Manifest) -> str | None:

@@ -29,7 +29,8 @@ from pathlib import Path
 
 import numpy as np
 
-from onespp.render.channels import CHANNELS, HALF, REFERENCE
+from onespp.render.channels import CHANNELS, REFERENCE
+from onespp.render.derived import available, sources, with_derived
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 
@@ -143,6 +144,11 @@ class FrameSequence:
         return list(self.manifest.frames)
 
     @property
+    def channels(self) -> tuple[str, ...]:
+        """What its frames have: those that files hold, and those that follow from them."""
+        return available(self.manifest.channels)
+
+    @property
     def size(self) -> tuple[int, int]:
         """(height, width)."""
         return self.manifest.height, self.manifest.width
@@ -163,20 +169,20 @@ class FrameSequence:
         return (header.height, header.width) == self.size and needed <= header.channels.keys()
 
     def read_frame(self, i: int, channels: Iterable[str] | None = None) -> Frame:
-        """A frame with the given channels (None: all that the manifest lists)."""
+        """A frame with the given channels (None: all that there are)."""
         self._check(i)
-        names = list(self.manifest.channels if channels is None else channels)
+        names = list(self.channels if channels is None else channels)
         for name in names:
-            if name not in self.manifest.channels:
+            if name not in self.channels:
                 raise InputError(f"the sequence {self.folder} lacks the channel '{name}' "
-                                 f"(it has {', '.join(self.manifest.channels)})")
+                                 f"(it has {', '.join(self.channels)})")
         matrices = self.read_matrices(i)
-        images = self._read(self._path("frames", i), names)
+        images = self._read(self._path("frames", i), sources(names, self.manifest.channels))
         for name in images:
             if CHANNELS[name].is_id:
                 images[name] = object_ids(self._path("frames", i), name, images[name],
                                           len(self.manifest.objects))
-        return Frame(i, images, *matrices)
+        return with_derived(Frame(i, images, *matrices), names)
 
     def read_matrices(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """camera_from_world, screen_from_world, world_from_object of a frame, float64."""
@@ -193,7 +199,7 @@ class FrameSequence:
         write_text(self._path("frames", frame.index, "json"),
                    format_matrices(frame.index, frame.camera_from_world, frame.screen_from_world,
                                    dict(zip(objects, frame.world_from_object))))
-        self._write(self._path("frames", frame.index), images, provenance)
+        self._write(self._path("frames", frame.index), images, provenance, half=self.manifest.half)
 
     def has_reference(self, i: int) -> bool:
         return self._path("reference", i).exists()
@@ -316,7 +322,8 @@ class FrameSequence:
         return {row.name: _joined([planes[c] for c in row.exr]) for row in rows}
 
     def _write(self, path: Path, images: Mapping[str, np.ndarray],
-               header: Mapping[str, str] | None, durable: bool = False) -> None:
+               header: Mapping[str, str] | None, durable: bool = False,
+               half: bool = False) -> None:
         planes = {}
         for name, image in images.items():
             row = CHANNELS[name]
@@ -324,7 +331,7 @@ class FrameSequence:
             if image.shape != expected:
                 raise InputError(f"{path} could not be written because '{name}' has shape "
                                  f"{image.shape}, expected {expected}")
-            image = _half(image) if row.stored == HALF else image.astype(np.float32)
+            image = _half(image) if row.is_half(half) else image.astype(np.float32)
             planes.update(zip(row.exr, np.moveaxis(np.atleast_3d(image), 2, 0)))
         write_exr(path, planes, header, durable)
 
