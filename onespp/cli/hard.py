@@ -12,7 +12,7 @@ import click
 from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import Steps, progress
 
-from .run import REFERENCE_SPP
+REFERENCE_SPP = 256
 
 
 @click.command()
