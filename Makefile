@@ -8,7 +8,7 @@ endif
 .PHONY: demo test pythons lint slow docs results clean
 
 demo: .venv/installed
-	$(BIN)/onespp run box --frames 0:8 --size 192x192 --reference-spp 256 --out data/demo \
+	$(BIN)/onespp run box --frames 0:8 --size 192x192 --reference-error 0.05 --out data/demo \
 	    --method bilateral --method assignment --method atrous --method svgf --method onespp
 	@echo "Look at data/demo/pictures."
 

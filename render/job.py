@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from onespp.render.channels import TRAINING
+from onespp.render.files.behind import writing_behind
 from onespp.render.files.json_file import checked
 from onespp.render.files.manifest import Manifest, first_difference
 from onespp.render.files.sequence import FrameSequence, another
 from onespp.render.host.machine import machine
 from onespp.render.host.versions import versions
 from onespp.render.progress import Progress, silent
+from onespp.render.reference_error import FEWEST_SPP
 from onespp.render.references import References
 from onespp.render.tracer.reference import whole_spp
 from onespp.render.tracer.renderer import Renderer
@@ -32,7 +34,8 @@ class RenderJob:
     Attributes:
         frames: frame numbers. height, width: pixels. seed: of all random numbers.
         reference_spp: samples a pixel of the reference, None for none; rounded up to what its four
-            parts can share.
+            parts can share. reference_error: instead, the error in dB to which references are to
+            tell the PSNR of the sequence, see `reference_error.py`.
         antialias: the reference is box-filtered over each pixel instead of through its centre.
         channels: what each frame carries, see `render/channels.py`; None: all that says something
             about this scene. added: channels beside those. training: of those by default, only
@@ -57,6 +60,7 @@ class RenderJob:
     added: Sequence[str] = ()
     training: bool = False
     half: bool = False
+    reference_error: float | None = None
 
     @cached_property
     def renderer(self) -> Renderer:
@@ -64,9 +68,21 @@ class RenderJob:
                         sampler=self.sampler)
 
     @property
-    def whole_spp(self) -> int | None:
-        """Samples a pixel that the reference gets; InputError if there can be no such one."""
-        return None if self.reference_spp is None else whole_spp(self.reference_spp)
+    def fewest_spp(self) -> int | None:
+        """Samples a pixel that a reference gets at least, None where there is to be none.
+
+        Raises:
+            InputError: there can be no such reference, or it is asked for in two ways.
+        """
+        if self.reference_error is None:
+            return None if self.reference_spp is None else whole_spp(self.reference_spp)
+        if self.reference_spp is not None:
+            raise InputError("--reference-spp and --reference-error both say how good references "
+                             "are to be: use one of them")
+        if not 0 < self.reference_error < float("inf"):
+            raise InputError(f"--reference-error is {self.reference_error}: use a number of dB "
+                             "above 0, as 0.05")
+        return FEWEST_SPP
 
     def channel_names(self) -> tuple[str, ...]:
         """The channels asked for, or else what the renderer has to say about the scene."""
@@ -81,7 +97,7 @@ class RenderJob:
             scene=self.scene.name, about=self.scene.about, fingerprint=fingerprint(self.scene),
             later=later_fingerprints(self.scene, self.frames), frames=tuple(self.frames),
             width=self.width, height=self.height, fps=self.scene.fps,
-            seed=self.seed, reference_spp=self.whole_spp, max_depth=self.scene.max_depth,
+            seed=self.seed, reference_spp=self.fewest_spp, max_depth=self.scene.max_depth,
             direct=self.direct, sampler=self.sampler,
             reference_filter="box" if self.antialias else "centre",
             channels=self.channel_names(), half=self.half, objects=self.scene.object_names,
@@ -92,17 +108,19 @@ class RenderJob:
 
 
 def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
-                    report: Progress = silent) -> FrameSequence:
+                    report: Progress = silent,
+                    tell: Callable[[str], None] = lambda sentence: None) -> FrameSequence:
     """Render what the folder does not hold yet.
 
     Args:
         report: told of the frames that are done, and of the references, in fractions.
+        tell: told what references of a wanted error are expected to cost, before they are rendered.
 
     Raises:
         InputError: the folder holds something else, or the disk refuses.
         SceneError: the scene cannot be built.
     """
-    spp = job.whole_spp
+    spp = job.fewest_spp
     job.scene.try_frames(job.frames)  # they may lie beyond those that the scene file was tried at
     _ = job.renderer  # a scene that can't be built replaces nothing
     manifest = job.manifest()
@@ -115,15 +133,19 @@ def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
                   "sampler": job.sampler}
     count = len(job.frames)
     what = f"render {job.scene.name} {job.width}x{job.height}"
-    for done, index in enumerate(job.frames, 1):
-        if not sequence.frame_is_whole(index):
-            frame = job.renderer.frame(index, job.seed, job.channel_names())
-            sequence.write_frame(frame, provenance | {"frame": str(index), "spp": "1"})
-        report(done, count, what)
+    with writing_behind() as hand_over:
+        for done, index in enumerate(job.frames, 1):
+            if not sequence.frame_is_whole(index):
+                hand_over(sequence.write_frame,  # (a name here would keep a third frame alive)
+                          job.renderer.frame(index, job.seed, job.channel_names()),
+                          provenance | {"frame": str(index), "spp": "1"})
+            report(done, count, what)
     if spp is not None:
         references = References(job.renderer, sequence, job.seed, job.antialias, provenance)
         what = f"reference, {spp} spp"
-        for done, index in enumerate(job.frames):
+        if job.reference_error is not None:
+            references.grow_to_error(job.frames, job.reference_error, report, tell)
+        for done, index in enumerate(job.frames if job.reference_error is None else ()):
             references.grow(index, spp, lambda part, whole, *_, done=done: report(
                 done + part / whole, count, what))
             report(done + 1, count, what)

@@ -1,9 +1,13 @@
-"""References in a folder: made, kept while they are unfinished, and grown from what is there."""
+"""References in a folder: made, kept while they are unfinished, and grown from what is there.
+
+Growing until the error is as asked for decides by what is on the disk alone: interrupted and gone
+on with, it takes the same steps to the same bytes.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +15,15 @@ import numpy as np
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.progress import Progress, silent
+from onespp.render.reference_error import (
+    FEWEST_SPP,
+    MOST_SPP,
+    FrameNoise,
+    expected_spp,
+    frame_noise,
+    next_to_grow,
+    standard_error,
+)
 from onespp.render.tracer.reference import (
     MOST_SAMPLES,
     PARTS,
@@ -21,6 +34,9 @@ from onespp.render.tracer.reference import (
 from onespp.render.tracer.renderer import Renderer
 
 SECONDS_BETWEEN_SAVES = 10.0
+
+_PILOT_SPP = 16  # of one frame, by which the others are judged beforehand
+_TIMED_SPP = 2
 
 _TOTALS = tuple(f"total{part}" for part in range(PARTS))
 _SAVED = {*_TOTALS, "samples", "antialias"}
@@ -75,6 +91,69 @@ class References:
             "filter": "box" if self.antialias else "centre"})
         self.sequence.remove_partial(index)
 
+    def grow_to_error(self, frames: Sequence[int], decibels: float,
+                      report: Progress = silent,
+                      tell: Callable[[str], None] = lambda sentence: None) -> None:
+        """Render and double references until the headline is known to `decibels`.
+
+        The headline is the mean over frames of the PSNR of a method of 40 dB, and its error the
+        standard error of `reference_error.py`. References of an older version have no halves that
+        could tell; those of FEWEST_SPP or more are kept and left out.
+
+        Args:
+            report: told of the frames that are done, as far as can be foreseen.
+            tell: told what it is expected to cost, and that not more can be had.
+        """
+        what, count = f"reference, to {decibels:g} dB", len(frames)
+        growing = [i for i in frames if self._samples(i) < FEWEST_SPP or self.sequence.has_parts(i)]
+        noises: dict[int, FrameNoise] = {}
+        there = [i for i in growing if self._samples(i)] or growing[:1]
+        for index in there:
+            self.grow(index, _PILOT_SPP, lambda done, total, *_: report(0, count, what))
+            self._measure(index, noises)
+        self._tell_cost(growing, noises, decibels, tell)
+
+        def grow(index: int, spp: int, target: int) -> None:
+            others = sum(noise.spp for i, noise in noises.items() if i != index)
+            self.grow(index, spp, lambda done, total, *_: report(
+                count * min((others + done) / target, 0.99), count, what))  # 1 is for the end
+            self._measure(index, noises)
+
+        target = _total(growing, noises, decibels)
+        for index in growing:
+            if self._samples(index) < FEWEST_SPP:
+                grow(index, FEWEST_SPP, target)
+        target = _total(growing, noises, decibels)
+        while (step := next_to_grow(noises, decibels)) is not None:
+            grow(*step, target)
+        if (reached := standard_error(noises.values())) > decibels:
+            tell(f"references end at {MOST_SPP} samples a pixel: the PSNR of a method of 40 dB is "
+                 f"known to {reached:.2g} dB, not {decibels:g}")
+        report(count, count, what)
+
+    def _measure(self, index: int, noises: dict[int, FrameNoise]) -> None:
+        reference = self.sequence.read_reference(index)
+        if reference.parts is not None and reference.spp is not None:
+            noises[index] = frame_noise(reference.parts, reference.spp)
+
+    def _tell_cost(self, frames: Sequence[int], noises: Mapping[int, FrameNoise], decibels: float,
+                   tell: Callable[[str], None]) -> None:
+        """What there is to do, and how long it is likely to take; nothing where nothing is."""
+        spp = expected_spp(_foreseen(frames, noises), decibels)
+        left = sum(max(0, n - self._samples(i)) for i, n in spp.items())
+        if left == 0:
+            return
+        self.renderer.sample_sum(frames[0], self.seed, 0, 1, self.antialias)  # compiles
+        start = time.perf_counter()
+        self.renderer.sample_sum(frames[0], self.seed, 0, _TIMED_SPP, self.antialias)
+        seconds = (time.perf_counter() - start) / _TIMED_SPP
+        height, width = self.sequence.size
+        fewest, most = min(spp.values()), max(spp.values())
+        tell(f"references to {decibels:g} dB are likely to take "
+             f"{fewest if fewest == most else f'{fewest} to {most}'} samples a pixel, so "
+             f"{_duration(left * seconds)} at {width * height / seconds / 1e6:.2g} million paths a "
+             "second")
+
     def _samples(self, index: int) -> int:
         """Samples a pixel of a frame's reference; 0 where there is none, or a damaged one."""
         try:
@@ -115,13 +194,20 @@ class References:
             return None
 
 
-def reference_notes(sequence: FrameSequence, frames: Sequence[int], asked: int) -> list[str]:
-    """Sentences about references that are not just as asked for, by their samples or their kind."""
-    notes, spp = [], whole_spp(asked)
+def reference_notes(sequence: FrameSequence, frames: Sequence[int],
+                    asked: int | None) -> list[str]:
+    """Sentences about references that are not just as asked for, by their samples or their kind.
+
+    Args:
+        asked: samples a pixel, None where an error was asked for.
+    """
+    notes = []
+    spp = None if asked is None else whole_spp(asked)
     if spp != asked:
         notes.append(f"references have {PARTS} parts of equally many samples: {spp} spp instead of "
                      f"{asked}")
-    if better := [found for i in frames if (found := sequence.reference_spp(i) or 0) > spp]:
+    found = [sequence.reference_spp(i) or 0 for i in frames]
+    if spp is not None and (better := [n for n in found if n > spp]):
         fewest, most = min(better), max(better)
         notes.append(f"kept {_count(len(better))} of "
                      f"{fewest if fewest == most else f'{fewest} to {most}'} spp, better than the "
@@ -130,6 +216,30 @@ def reference_notes(sequence: FrameSequence, frames: Sequence[int], asked: int) 
         notes.append(f"kept {_count(old)} of an older version, without independent halves: scores "
                      "against them have a noise floor (--overwrite replaces them)")
     return notes
+
+
+def _foreseen(frames: Sequence[int], noises: Mapping[int, FrameNoise]) -> dict[int, FrameNoise]:
+    """Noise of all frames with the fewest samples or more; those not rendered are as the others."""
+    known = list(noises.values())
+    if not known:
+        return {}
+    like = [noise.at(FEWEST_SPP) for noise in known]
+    usual = FrameNoise(FEWEST_SPP, float(np.mean([noise.crossed for noise in like])),
+                       float(np.mean([noise.squared for noise in like])))
+    return {i: max(noises[i], noises[i].at(FEWEST_SPP), key=lambda noise: noise.spp)
+            if i in noises else usual for i in frames}
+
+
+def _total(frames: Sequence[int], noises: Mapping[int, FrameNoise], decibels: float) -> int:
+    """Samples a pixel of all frames' references together, in the end; at least 1."""
+    return max(1, sum(expected_spp(_foreseen(frames, noises), decibels).values()))
+
+
+def _duration(seconds: float) -> str:
+    for unit, size in (("hours", 3600), ("minutes", 60)):
+        if seconds >= 1.5 * size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds:.2g} seconds"
 
 
 def _count(references: int) -> str:

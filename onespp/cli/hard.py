@@ -11,7 +11,7 @@ from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import progress
 from onespp.render.progress import Progress
 
-from .run import REFERENCE_SPP
+REFERENCE_SPP = 256
 
 
 @click.command()

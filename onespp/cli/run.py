@@ -12,7 +12,7 @@ from onespp.denoise.cli.score import score_in
 from onespp.render.cli.options import render_options, use
 from onespp.render.cli.render import channel_names, render_to
 
-REFERENCE_SPP = 256
+REFERENCE_ERROR = 0.05  # dB
 
 
 @click.command()
@@ -25,13 +25,18 @@ REFERENCE_SPP = 256
 @click.pass_context
 def run(context: click.Context, scene: str, out: Path | None, methods: tuple[str, ...],
         device: str, threads: int | None, reference_spp: int | None, channels: str | None,
-        **options) -> None:
-    """Render SCENE with ground truth, denoise it and score the result."""
+        reference_error: float | None, **options) -> None:
+    """Render SCENE with ground truth, denoise it and score the result.
+
+    References are as with --reference-error 0.05, unless their samples are given.
+    """
     use(device, threads)
     named, added = channel_names(channels)
     check_methods(methods, (*(named or ()), *added))
-    spp = REFERENCE_SPP if reference_spp is None else reference_spp
-    sequence = render_to(scene, out, reference_spp=spp, channels=channels, **options)
+    if reference_spp is None and reference_error is None:
+        reference_error = REFERENCE_ERROR
+    sequence = render_to(scene, out, reference_spp=reference_spp, reference_error=reference_error,
+                         channels=channels, **options)
     default = context.get_parameter_source("methods") == ParameterSource.DEFAULT
     denoise_in(sequence.folder, methods, default=default)
     score_in(sequence.folder)

@@ -39,6 +39,10 @@ def render_options(command):
         click.option("--reference-spp", type=int, metavar="N",
                      help="Also render ground truth with N samples a pixel; what is there "
                           "with more is kept."),
+        click.option("--reference-error", type=float, metavar="DB",
+                     help="Also render ground truth, of as many samples in each frame as it takes "
+                          "to know the PSNR of a method of 40 dB to DB (one standard error); tells "
+                          "what it is likely to cost first. Instead of --reference-spp."),
         click.option("--antialias", is_flag=True,
                      help="Box-filter the reference over each pixel instead of its centre."),
         click.option("--channels", metavar="NAMES",

@@ -16,7 +16,7 @@ from onespp.scenes import catalog
 
 from .arguments import parse_size
 from .options import overwrite_option, render_options, use
-from .terminal import command_line, progress
+from .terminal import command_line, note, progress
 
 
 @click.command()
@@ -35,8 +35,9 @@ def render(scene: str, out: Path | None, device: str, threads: int | None, **opt
 
 
 def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: str | None, seed: int,
-              reference_spp: int | None, antialias: bool, channels: str | None, half: bool,
-              direct: str, sampler: str, overwrite: bool) -> FrameSequence:
+              reference_spp: int | None, reference_error: float | None, antialias: bool,
+              channels: str | None, half: bool, direct: str, sampler: str,
+              overwrite: bool) -> FrameSequence:
     """Do what the options of a command ask."""
     scene = catalog.load(scene_name)
     height, width = parse_size(size) if size is not None else (scene.height, scene.width)
@@ -49,12 +50,14 @@ def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: st
     from onespp.render.references import reference_notes
 
     job = RenderJob(scene, numbers, height, width, seed, reference_spp, antialias, names,
-                    direct, sampler, command_line(), added, channels == "training", half)
+                    direct, sampler, command_line(), added, channels == "training",
+                    half, reference_error)
     out = out or Path("data") / scene.name
     with writing(out, "render", alone=overwrite), progress() as report:
-        sequence = render_sequence(job, out, overwrite=overwrite, report=report)
-    for note in reference_notes(sequence, numbers, reference_spp) if reference_spp else ():
-        click.echo(note)
+        sequence = render_sequence(job, out, overwrite=overwrite, report=report, tell=note)
+    if job.fewest_spp is not None:
+        for sentence in reference_notes(sequence, numbers, reference_spp):
+            click.echo(sentence)
     return sequence
 
 
@@ -104,8 +107,8 @@ def import_(folder: Path, out: Path | None, fps: float, check: bool, overwrite: 
         sequence = import_games202(folder, out, fps=fps, overwrite=overwrite, check=check,
                                    command=command_line(), tell=notes.append)
     click.echo(f"imported {len(sequence.frames)} frames into {sequence.folder}")
-    for note in notes:
-        click.echo(note)
+    for sentence in notes:
+        click.echo(sentence)
 
 
 @click.command()

@@ -1,0 +1,98 @@
+"""What a reference's parts say of the PSNR that they can tell, and what is grown by it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from onespp.render.reference_error import (
+    FEWEST_SPP,
+    MOST_SPP,
+    FrameNoise,
+    expected_spp,
+    frame_noise,
+    next_to_grow,
+    standard_error,
+)
+from onespp.render.srgb import srgb_from_linear
+
+H, W = 40, 50
+TRUTH = np.broadcast_to(np.linspace(0.1, 0.6, W)[:, None], (H, W, 3))
+
+
+def noisy(rng: np.random.Generator, sigma: float, channels: int) -> np.ndarray:
+    """Four parts around TRUTH; the noise is one in all channels (1), or in each another (3)."""
+    return TRUTH + sigma * rng.standard_normal((4, H, W, channels))
+
+
+def told_psnr(rng: np.random.Generator, parts: np.ndarray) -> float:
+    """The PSNR of a method of 40 dB, by the product of the halves (no correction needed: flat)."""
+    x = srgb_from_linear(TRUTH) + 1e-2 * rng.choice([-1.0, 1.0], (H, W, 1))
+    a, b = (srgb_from_linear(half) for half in (parts[:2].mean(0), parts[2:].mean(0)))
+    return -10 * math.log10(np.mean((x - a) * (x - b)))
+
+
+@pytest.mark.parametrize("sigma", [0.002, 0.01, 0.03])
+def test_the_stated_error_is_the_spread_of_what_references_tell(sigma):
+    rng = np.random.default_rng(1)
+    stated, told = [], []
+    for _ in range(400):
+        parts = noisy(rng, sigma, 1)
+        stated.append(frame_noise(parts, 64).variance)
+        told.append(told_psnr(rng, parts))
+    # 400 repetitions: the spread's own deviation is 3.5 %; the curve bends 0.03 at 0.1.
+    assert np.mean(stated) ** 0.5 == pytest.approx(np.std(told, ddof=1), rel=0.15)
+
+
+def test_channels_whose_noise_differs_are_told_better_than_stated():
+    rng = np.random.default_rng(2)
+    parts = [noisy(rng, 0.02, 3) for _ in range(200)]
+    stated = np.mean([frame_noise(p, 64).variance for p in parts]) ** 0.5
+    assert 0.5 * stated < np.std([told_psnr(rng, p) for p in parts]) < 0.9 * stated
+
+
+def test_noise_is_foreseen_as_of_independent_samples():
+    rng = np.random.default_rng(3)
+    few, many = (frame_noise(noisy(rng, 0.03 / n**0.5, 1), n) for n in (16, 256))
+    foreseen = few.at(256)
+    assert foreseen.spp == 256
+    assert foreseen.crossed == pytest.approx(many.crossed, rel=0.1)
+    assert foreseen.squared == pytest.approx(many.squared, rel=0.15)
+
+
+def test_clipped_black_and_broken_pixels_add_nothing():
+    parts = np.stack([TRUTH * 0 + 5, TRUTH * 0 + 7, TRUTH * 0 + 9, TRUTH * 0 + 4])
+    assert frame_noise(parts, 64).variance == 0
+    rng = np.random.default_rng(4)
+    good = noisy(rng, 0.02, 3)
+    broken = good.copy()
+    broken[2, 0, 0] = np.nan
+    assert 0 < frame_noise(broken, 64).variance < frame_noise(good, 64).variance
+
+
+def test_the_error_of_the_mean_is_that_of_frames_added_up():
+    assert standard_error([FrameNoise(64, 0.09, 0.16)]) == pytest.approx(0.5)
+    assert standard_error([FrameNoise(64, 0.25, 0.0)] * 4) == pytest.approx(0.25)
+    assert standard_error([]) == 0
+
+
+def test_what_gains_most_grows_first_and_no_further_than_asked_for():
+    noises = {0: FrameNoise(64, 1e-4, 0), 3: FrameNoise(64, 0.64, 0), 7: FrameNoise(256, 1.0, 0)}
+    assert next_to_grow(noises, 0.1) == (3, 128)
+    assert next_to_grow({**noises, 3: FrameNoise(4096, 0.64, 0)}, 0.1) == (7, 512)
+    assert next_to_grow(noises, 1.0) is None
+    assert next_to_grow({5: FrameNoise(64, 1, 0), 2: FrameNoise(64, 1, 0)}, 0.1) == (2, 128)
+    spp = expected_spp(noises, 0.1)
+    assert standard_error(noises[i].at(n) for i, n in spp.items()) <= 0.1
+    assert spp[3] > spp[0] == FEWEST_SPP
+    halved = {i: n // 2 if n > noises[i].spp else n for i, n in spp.items()}
+    assert standard_error(noises[i].at(n) for i, n in halved.items()) > 0.1
+
+
+def test_growing_ends_at_the_most_samples():
+    assert next_to_grow({0: FrameNoise(MOST_SPP, 1, 0)}, 0.1) is None
+    assert expected_spp({0: FrameNoise(64, 1e9, 0), 1: FrameNoise(64, 1, 1)}, 1e-3) == {
+        0: MOST_SPP, 1: MOST_SPP}
+    assert next_to_grow({0: FrameNoise(MOST_SPP - 8, 1, 0)}, 0.1) == (0, MOST_SPP)
