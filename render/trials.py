@@ -72,15 +72,6 @@ def _matplotlib(folder: Path) -> str:
     return "drew a plot"
 
 
-def _flip(folder: Path) -> str:
-    import flip_evaluator
-
-    image = np.full((16, 16, 3), 0.5, np.float32)
-    _, mean, _ = flip_evaluator.evaluate(image, image, "LDR", True, False, True, {})
-    _expect(mean == 0, f"says that equal images differ by {mean}")
-    return "compared two images"
-
-
 def _kernel(folder: Path) -> str:
     from .host import backend
 
@@ -149,7 +140,6 @@ TRIALS: dict[str, Trial] = {
     "Mitsuba": Trial(_mitsuba, "mitsuba"),
     "Pillow": Trial(_pillow, "pillow"),
     "Matplotlib": Trial(_matplotlib, "matplotlib"),
-    "FLIP": Trial(_flip, "flip-evaluator", "there are no FLIP scores"),
     "ffmpeg": Trial(_ffmpeg, "imageio-ffmpeg", "videos are left out"),
     "Open Image Denoise": Trial(_oidn, "pyoidn", "there are no OIDN rows in tables"),
 }

@@ -130,7 +130,7 @@ def test_the_rules_hold():
     ("onespp.denoise.score.compare", "import matplotlib.pyplot", "imports matplotlib"),
     ("onespp.denoise.run.sequence", "from PIL import Image", "imports PIL"),
     ("onespp.denoise.score.sequence", "import jinja2", "imports jinja2"),
-    ("onespp.denoise.metrics.flip", "import imageio_ffmpeg", "imports imageio_ffmpeg"),
+    ("onespp.denoise.metrics.perceptual.flip", "import imageio_ffmpeg", "imports imageio_ffmpeg"),
     ("onespp.denoise.studies.hard_scenes", "from onespp.scenes.hard import HARD", "imports"),
     ("onespp.denoise.run.sequence", "from onespp.render.tracer import path", "imports"),
     ("onespp.denoise.methods.svgf", "import mitsuba as mi", "imports mitsuba"),

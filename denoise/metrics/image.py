@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from .perceptual.flip import FlipReference
 from .tonemap import srgb_from_linear
 
 
@@ -19,6 +21,29 @@ def non_finite(image: np.ndarray) -> np.ndarray:
     return np.logical_not(np.isfinite(image).all(axis=-1))
 
 
+class Target:
+    """A frame's reference, and what the measures make of it: once for all images it judges.
+
+    Args:
+        reference: (h, w, 3) linear radiance.
+    Attributes:
+        unknown: (h, w) mask of its non-finite pixels. linear: it with those in black. srgb: its
+            display values.
+    """
+
+    def __init__(self, reference: np.ndarray) -> None:
+        self.unknown = non_finite(reference)
+        self.linear = blacken(reference, self.unknown)
+
+    @cached_property
+    def srgb(self) -> np.ndarray:
+        return srgb_from_linear(self.linear)
+
+    @cached_property
+    def flip(self) -> FlipReference:
+        return FlipReference(self.linear)
+
+
 @dataclass(frozen=True)
 class Pair:
     """An image and its reference, fit for the measures.
@@ -26,18 +51,25 @@ class Pair:
     Attributes:
         linear: (a, b), (h, w, 3) linear radiance.
         srgb: (a, b), (h, w, 3) display values in [0, 1].
+        target: that of b.
     """
 
     linear: tuple[np.ndarray, np.ndarray]
     srgb: tuple[np.ndarray, np.ndarray]
+    target: Target
+
+    @property
+    def flip(self) -> tuple[np.ndarray, FlipReference]:
+        """(a, b), a as radiance."""
+        return self.linear[0], self.target.flip
 
 
-def pair(image: np.ndarray, reference: np.ndarray) -> Pair:
+def pair(image: np.ndarray, reference: np.ndarray | Target) -> Pair:
     """Two (h, w, 3) images of linear radiance, to be compared.
 
     A non-finite pixel of `image` is judged as black. Where `reference` is not finite, neither is
     judged (black in both).
     """
-    unknown = non_finite(reference)
-    linear = blacken(image, non_finite(image) | unknown), blacken(reference, unknown)
-    return Pair(linear, (srgb_from_linear(linear[0]), srgb_from_linear(linear[1])))
+    target = reference if isinstance(reference, Target) else Target(reference)
+    linear = blacken(image, non_finite(image) | target.unknown)
+    return Pair((linear, target.linear), (srgb_from_linear(linear), target.srgb), target)

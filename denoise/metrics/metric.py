@@ -14,8 +14,8 @@ class Metric:
         name: key in scores.json and column in scores.csv.
         label: heading in tables.
         function: (a, b) -> float, finite for finite images; None where it does not apply.
-        space: what `function` takes, "linear" radiance, "srgb" display values, or a "step" of two
-            frames (`flicker.py`).
+        space: what `function` takes, "linear" radiance, "srgb" display values, "flip" (radiance,
+            and a `FlipReference`), or a "step" of two frames (`flicker.py`).
         unit: goes with the label, as "dB"; "" where there is none.
         higher_is_better: the direction.
         format: how tables print it.

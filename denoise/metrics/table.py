@@ -2,7 +2,7 @@
 
 Symbols: a the image to judge, b the reference, both (h, w, 3); S the tone map; means run over
 pixels and colours alike, in float64. A row says in which space its function takes a and b:
-"linear" radiance, or "srgb", display values in [0, 1] (`tonemap.py`).
+"linear" radiance, "srgb", display values in [0, 1] (`tonemap.py`), or "flip".
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from types import MappingProxyType
 
 import numpy as np
 
-from . import flip
 from .errors import PSNR_CAP, energy_error, psnr, relmse, smape
 from .flicker import boiling, difference_psnr, flicker
 from .image import Pair, pair
 from .metric import Metric
-from .ssim import ssim
+from .perceptual.flip import flip, hdr_flip
+from .perceptual.ssim import ssim
 
 _ROWS = (
     Metric("psnr_srgb", "PSNR", psnr, "srgb", "dB", True, ".2f",
@@ -32,18 +32,15 @@ _ROWS = (
            "|mean(a) / mean(b) - 1|, linear", in_table=False),
     Metric("ssim", "SSIM", ssim, "srgb", "", True, ".4f",
            "structural similarity, Gaussian of 1.5 pixels, mean over colours, on clipped sRGB"),
-)
-_FLIP_ROWS = (
-    Metric("flip", "FLIP", flip.flip, "srgb", "", False, ".4f",
+    Metric("flip", "FLIP", flip, "flip", "", False, ".4f",
            "mean LDR-FLIP at 67 pixels per degree, on clipped sRGB; "
            "on at most 8 frames, spread evenly", most_frames=8),
-    Metric("flip_hdr", "HDR-FLIP", flip.hdr_flip, "linear", "", False, ".4f",
+    Metric("flip_hdr", "HDR-FLIP", hdr_flip, "flip", "", False, ".4f",
            "mean HDR-FLIP (ACES), linear, where a reference exceeds 1; "
            "on at most 2 frames, spread evenly", in_table=False, most_frames=2),
 )
 
-METRICS = MappingProxyType({
-    row.name: row for row in (*_ROWS, *(_FLIP_ROWS if flip.AVAILABLE else ()))})
+METRICS = MappingProxyType({row.name: row for row in _ROWS})
 
 HEADLINE = METRICS["psnr_srgb"]
 

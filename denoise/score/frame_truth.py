@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from onespp.denoise.geometry.correspondence import GUIDES, NOWHERE, previous_pixel
+from onespp.denoise.metrics.image import Target
 from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.frame import Frame
 
@@ -30,6 +32,11 @@ class FrameTruth:
     source: np.ndarray | None = None
     causes: np.ndarray | None = None
     still: np.ndarray | None = None
+
+    @cached_property
+    def target(self) -> Target | None:
+        """What images are compared with."""
+        return None if self.reference is None else Target(self.reference.color)
 
 
 def read_frame_truth(sequence: FrameSequence, number: int,

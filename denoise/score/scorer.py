@@ -60,8 +60,8 @@ class MethodScorer:
             metrics: names of those to measure.
         """
         values: dict[str, float | None] = dict.fromkeys(MEASURES)
-        if ground.reference is not None:
-            images = pair(image, ground.reference.color)
+        if ground.target is not None:
+            images = pair(image, ground.target)
             values.update(measure_pair(images, metrics))
             if self._before and self._before[0] == after:
                 values.update(_changes(self._before[1], images, ground))

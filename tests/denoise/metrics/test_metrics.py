@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from onespp.denoise.metrics import flip
 from onespp.denoise.metrics.errors import PSNR_CAP, decibels, energy_error, mse, psnr, relmse, smape
 from onespp.denoise.metrics.image import non_finite
 from onespp.denoise.metrics.noise_floor import reference_floor
-from onespp.denoise.metrics.ssim import ssim
+from onespp.denoise.metrics.perceptual import flip
+from onespp.denoise.metrics.perceptual.ssim import ssim
 from onespp.denoise.metrics.table import HEADLINE, METRICS, measure, spread
 from onespp.denoise.metrics.tonemap import bytes_from_linear, linear_from_srgb, srgb_from_linear
 
@@ -113,7 +113,7 @@ def test_a_metric_does_not_care_which_way_up_an_image_is(metric):
     image, reference = images()
     colours = 1 if metric.name.startswith("flip") else -1  # the eye tells red from blue
     flipped = measure(image[::-1, :, ::colours], reference[::-1, :, ::colours])[metric.name]
-    rel = 1e-9 if colours == -1 else 1e-4
+    rel = {"ssim": 1e-6, "flip": 1e-4, "flip_hdr": 1e-4}.get(metric.name, 1e-9)  # of float32
     assert flipped == pytest.approx(measure(image, reference)[metric.name], rel=rel)
 
 
@@ -212,13 +212,13 @@ def ssim_by_the_paper(a: np.ndarray, b: np.ndarray) -> float:
 
 def test_ssim_equals_the_papers_formula():
     a, b = map(srgb_from_linear, images(height=14, width=17))
-    assert ssim(a, b) == pytest.approx(ssim_by_the_paper(a, b), rel=1e-9)
+    assert ssim(a, b) == pytest.approx(ssim_by_the_paper(a, b), rel=1e-6)
 
 
 def test_ssim_has_the_value_of_scikit_image():
     y, x = np.mgrid[:24, :31]
     a = np.stack([0.5 + 0.4 * np.sin(0.3 * x + 0.1 * y), x / 31, y / 24], axis=-1)
-    assert ssim(a, a[::-1]) == pytest.approx(0.26839913684219324, rel=1e-9)  # 0.26
+    assert ssim(a, a[::-1]) == pytest.approx(0.26839913684219324, rel=1e-6)  # 0.26
 
 
 def test_an_image_smaller_than_the_window_is_mirrored():
@@ -227,10 +227,6 @@ def test_an_image_smaller_than_the_window_is_mirrored():
     assert 0 < ssim(*map(srgb_from_linear, (image, reference))) < 1
 
 
-needs_flip = pytest.mark.skipif(not flip.AVAILABLE, reason="flip-evaluator is not installed")
-
-
-@needs_flip
 def test_flip_of_opposites_is_one_and_of_a_just_visible_step_is_small():
     black, white = np.zeros((40, 40, 3), np.float32), np.ones((40, 40, 3), np.float32)
     assert flip.flip(white, black) > 0.9
@@ -238,18 +234,39 @@ def test_flip_of_opposites_is_one_and_of_a_just_visible_step_is_small():
     assert flip.flip_map(white, black).shape == (40, 40)
 
 
-@needs_flip
-def test_hdr_flip_has_the_exposures_that_the_library_finds_itself():
-    import flip_evaluator
+@pytest.mark.parametrize("size", [(3, 4), (33, 70), (130, 161)])
+@pytest.mark.parametrize("change", ["noise", "shift", "negative"])
+def test_flip_is_that_of_its_authors_library(size, change):
+    library = pytest.importorskip("flip_evaluator")
+    y, x = np.mgrid[:size[0], :size[1]]
+    reference = np.stack([0.5 + 0.5 * np.sin(0.05 * x + 0.02 * y), 0.5 + 0.5 * np.sin(0.3 * x),
+                          0.8 * ((x // 9 + y // 7) % 2)], axis=-1) ** 2
+    noise = np.random.default_rng(0).normal(0, 0.05, reference.shape)
+    image = {"noise": np.maximum(reference + noise, 0), "shift": np.roll(reference, 2, axis=1),
+             "negative": 1 - reference}[change]
+    a, b = image.astype(np.float32), reference.astype(np.float32)
+    wanted = library.evaluate(*map(srgb_from_linear, (b, a)), "LDR", True, False, False)[0][..., 0]
+    found = flip.flip_map(*map(srgb_from_linear, (a, b)))
+    assert np.abs(found - wanted).max() < 1e-3
+    assert found.mean(dtype=float) == pytest.approx(wanted.mean(dtype=float), abs=1e-4)
+    reference = flip.FlipReference(4 * b)
+    wanted = library.evaluate(4 * b, 4 * a, "HDR", False, False, False)[0][..., 0]
+    found = reference.hdr_map(4 * a)
+    assert np.abs(found - wanted).max() < 1e-3
+    assert found.mean(dtype=float) == pytest.approx(wanted.mean(dtype=float), abs=1e-4)
+    assert np.abs(flip.FlipReference(b).map(a)
+                  - flip.flip_map(*map(srgb_from_linear, (a, b)))).max() < 1e-3
 
+
+def test_hdr_flip_has_the_exposures_that_the_library_finds_itself():
+    library = pytest.importorskip("flip_evaluator")
     image, reference = images(height=32, width=32)
-    _, score, found = flip_evaluator.evaluate(reference, image, "HDR", False, False)
+    _, score, found = library.evaluate(reference, image, "HDR", False, False)
     assert flip.exposures(reference) == pytest.approx(
         (found["startExposure"], found["stopExposure"]), abs=1e-3)
     assert flip.hdr_flip(image, reference) == pytest.approx(score, rel=1e-3)
 
 
-@needs_flip
 @pytest.mark.parametrize("reference", [
     np.full((5, 6, 3), 3.0), np.full((5, 6, 3), 1e30),
     1e-20 + np.eye(6)[..., None] * [9.0, 0.0, 1.0]])
@@ -261,7 +278,6 @@ def test_hdr_flip_survives_references_without_a_range(reference):
     assert start <= stop <= start + 24
 
 
-@needs_flip
 def test_hdr_flip_is_not_measured_where_a_display_shows_everything():
     image, _ = images()
     assert flip.hdr_flip(image, np.full(image.shape, 0.9)) is None
@@ -328,7 +344,7 @@ def test_noise_that_the_display_clips_does_not_lower_the_floor():
 def test_every_metric_says_what_it_is():
     for name, metric in METRICS.items():
         assert name == metric.name
-        assert metric.space in ("linear", "srgb")
+        assert metric.space in ("linear", "srgb", "flip")
         assert metric.about
         assert metric.label
         assert f"{1.0:{metric.format}}"

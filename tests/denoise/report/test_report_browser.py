@@ -9,8 +9,8 @@ from urllib.parse import parse_qs
 import numpy as np
 import pytest
 
-from onespp.denoise.metrics.flip import flip_map
 from onespp.denoise.metrics.image import pair
+from onespp.denoise.metrics.perceptual.flip import flip_map
 from onespp.denoise.metrics.tonemap import bytes_from_linear
 from onespp.denoise.report.html import write_report
 from onespp.denoise.score.sequence import score
@@ -378,7 +378,6 @@ def test_frames_that_fly_by_are_not_loaded(browser, report):
 
 @pytest.mark.parametrize("workers", [True, False])
 def test_the_flip_map_is_that_of_the_library(browser, report, workers):
-    pytest.importorskip("flip_evaluator", reason="flip-evaluator is not installed")
     page = new_page(browser)
     if not workers:
         page.add_init_script("delete window.Worker")

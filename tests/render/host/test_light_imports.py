@@ -12,7 +12,7 @@ MAPS = Path("/proc/self/maps")
 LIGHT = tuple(f"onespp.{name}" for name in (
     "render", "render.files.sequence", "render.files.exr", "render.files.times",
     "render.games202.convert", "render.cli.render", "denoise", "denoise.metrics.table",
-    "denoise.metrics.flip", "denoise.metrics.flicker", "denoise.score.causes",
+    "denoise.metrics.perceptual.flip", "denoise.metrics.flicker", "denoise.score.causes",
     "denoise.score.scorer", "denoise.score.scorecard", "denoise.score.cost",
     "denoise.score.compare", "denoise.score.sequence", "denoise.report.contact_sheets",
     "denoise.report.provenance", "denoise.report.html", "denoise.cli.denoise", "denoise.cli.score",

