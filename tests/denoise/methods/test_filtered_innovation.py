@@ -82,6 +82,16 @@ def test_it_is_the_formula_in_float64(height, width, levels, sharp_levels, shado
     np.testing.assert_allclose(image, expected, rtol=1e-3, atol=5e-5)
 
 
+def test_a_signal_follows_by_no_less_than_the_weight_of_the_current_frame():
+    """With gains below 1/n, and no change that is certain, a decides what is taken of S[e]."""
+    frames = split(19, 26)
+    method = FilteredInnovation(
+        min_gain=0.05, sharp_min_gain=0.05, noise_threshold=1e6, innovation_levels=4,
+        output_levels=3, sharp_innovation_levels=2, sharp_output_levels=2)
+    image, _ = run(method, frames)
+    np.testing.assert_allclose(image, innovation_oracle.run(frames, method), rtol=1e-3, atol=5e-5)
+
+
 def test_it_is_the_formula_where_light_falls_on_a_texture_and_debts_are_paid(monkeypatch):
     """Stripes are in the light here, as where albedo is not known; the last frame is dark."""
     frames = split(19, 26, 4)

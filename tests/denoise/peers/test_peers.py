@@ -104,6 +104,17 @@ def test_qualities_and_modes_are_not_the_same():
 
 
 @needs_oidn
+@pytest.mark.parametrize("guide", ["albedo", "normal"])
+def test_an_edge_in_one_guide_alone_reaches_the_network(guide):
+    frame = noisy(make_frame(H, W, wall_end=1e9))
+    image = np.array(frame[guide])
+    image[:, W // 2:] = (0.1, 0.9, 0.1)
+    changed = np.abs(run("oidn-fast", with_images(frame, **{guide: image}))
+                     - run("oidn-fast", frame)).max(axis=-1)
+    assert changed.max() > 0.01
+
+
+@needs_oidn
 def test_a_frame_does_not_depend_on_the_one_before():
     a, b = noisy(make_frame(H, W)), noisy(make_frame(H, W), seed=5)
     bare = without(b, "albedo")

@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 
 from onespp.render.channels import CHANNELS, HALF
 from onespp.render.errors import InputError
-from onespp.render.files.exr import read_header
+from onespp.render.files.exr import read_exr, read_header
 from onespp.render.files.frame_ranges import format_frames, parse_frames
 from onespp.render.files.manifest import Manifest, Run
 from onespp.render.files.matrices import format_matrices, read_matrices
@@ -50,6 +50,15 @@ def test_channel_names_are_the_ones_other_programs_know(tmp_path):
     names = set(read_header(sequence.folder / "frames/0000.exr").channels)
     assert {"R", "G", "B", "Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "ID",
             "albedo.R", "albedo.G", "albedo.B", "direct.R"} <= names
+
+
+def test_planes_hold_what_their_names_say_to_other_programs(tmp_path):
+    frame, sequence = small_frame(0), small_sequence(tmp_path / "s", (0,))
+    planes, _ = read_exr(sequence.folder / "frames/0000.exr")
+    for name, layer in (("color", "RGB"), ("direct", ("direct.R", "direct.G", "direct.B")),
+                        ("normal", ("N.X", "N.Y", "N.Z")), ("position", ("P.X", "P.Y", "P.Z"))):
+        for i, plane in enumerate(layer):
+            np.testing.assert_array_equal(planes[plane], frame[name][..., i], err_msg=plane)
 
 
 def test_half_channels_are_clipped_and_never_overflow(tmp_path):
@@ -249,6 +258,12 @@ def test_frames_and_a_reference_can_be_added_later(tmp_path):
     ({"objects": ("a", "b")}, "another objects"),
     ({"channels": ("color",)}, "another channels"),
     ({"max_depth": 3}, "another max_depth"),
+    ({"height": 22}, "another height (21 there, 22 here)"),
+    ({"source": "games202"}, "another source"),
+    ({"fps": 25.0}, "another fps"),
+    ({"spp": 2}, "another spp"),
+    ({"direct": "resampled"}, "another direct (mis there, resampled here)"),
+    ({"sampler": "zsobol"}, "another sampler (pcg there, zsobol here)"),
 ])
 def test_another_sequence_is_not_continued_and_the_difference_is_named(tmp_path, change, words):
     small_sequence(tmp_path / "s")
