@@ -166,7 +166,7 @@ def test_missing_channels_and_other_sizes_are_named(name):
 
 
 def split_frame(visible: np.ndarray, seed: int = 0):
-    """A lit frame: textured unshadowed light of which `visible`, 0 or 1, arrives; no other light."""
+    """A frame with textured unshadowed light of which `visible` arrives, and even other light."""
     frame = make_frame(H, W, wall_end=1e9)
     rng = np.random.default_rng(7)
     unshadowed = rng.uniform(0.2, 2.0, (H, W, 3)).astype(np.float32)
