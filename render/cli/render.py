@@ -34,10 +34,11 @@ def render(scene: str, out: Path | None, device: str, threads: int | None, **opt
     click.echo(f"rendered {len(sequence.frames)} frames into {sequence.folder}")
 
 
-def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: str | None, seed: int,
-              reference_spp: int | None, reference_error: float | None, antialias: bool,
-              channels: str | None, half: bool, direct: str, sampler: str,
-              overwrite: bool) -> FrameSequence:
+def render_to(scene_name: str, out: Path | None, *, frames: str | None = None,
+              size: str | None = None, seed: int = 0, reference_spp: int | None = None,
+              reference_error: float | None = None, antialias: bool = False,
+              channels: str | None = None, half: bool = False, direct: str = "resampled",
+              sampler: str = "zsobol", overwrite: bool = False) -> FrameSequence:
     """Do what the options of a command ask."""
     scene = catalog.load(scene_name)
     height, width = parse_size(size) if size is not None else (scene.height, scene.width)
