@@ -44,7 +44,8 @@ class RenderJob:
         channels: what each frame carries, see `render/channels.py`; None: all that says something
             about this scene. added: channels beside those.
         direct, sampler: the estimator of direct light and the random numbers of the frames, see
-            `render/renderer.py`. (References are always resampled and Sobol.)
+            `render/renderer.py`. (References always compare candidates
+            and are always Sobol.)
         command: the command line, for the manifest.
     """
 

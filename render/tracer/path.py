@@ -3,8 +3,9 @@
 Symbols (Veach 1997): beta, throughput of the path so far over its probability; p, a density over
 solid angle; `depth`, segments behind the current vertex.
 
-The estimator is that of Mitsuba's `path` without Russian roulette (a scene's paths are short).
-It differs in what it returns: radiance split by the number of scattering events, from one primary
+The estimator is that of Mitsuba's `path` without Russian roulette (a scene's paths are short), but
+that a vertex may compare several points of the lights (`candidates.py`). It differs in what it
+returns: radiance split by the number of scattering events, from one primary
 hit that the G-buffer shares; and what a reflection needs: the part of indirect light whose first
 direction was sampled from a glossy or mirror lobe, and what that path met next. Where a surface has
 several lobes, that is an unbiased share of the whole (each direction counts as glossy with the
@@ -19,6 +20,7 @@ import drjit as dr
 
 from onespp.render.mitsuba.variant import mi
 
+from .candidates import sought_light
 from .lights import DirectLight, power_heuristic, resample_lights, shape_index
 from .sampler import Sampler
 
@@ -47,7 +49,7 @@ class Radiance:
 
 @dr.syntax
 def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
-          max_depth: int, resampled: bool = False) -> Radiance:
+          max_depth: int, resampled: bool = False, candidates: int = 1) -> Radiance:
     """One path a lane.
 
     Args:
@@ -55,6 +57,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         sampler: random numbers, advanced by the call.
         max_depth: longest path in segments, as in Mitsuba (1: emission, 2: direct light).
         resampled: direct light at the first hit by resampling instead of by MIS.
+        candidates: points of the lights that a vertex compares before it sends its shadow ray.
     """
     context = mi.BSDFContext()
     ray = mi.Ray3f(ray)
@@ -95,12 +98,9 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         if dr.hint(resampled, mode="scalar"):
             smooth &= depth > 0
             arrived += dr.select((depth == 1) & ~from_delta, found, 0)
-        light, light_weight = scene.sample_emitter_direction(si, sampler.next_2d(), True, smooth)
-        lit = smooth & (light.pdf != 0)
-        bsdf_value, p, bsdf_sample, bsdf_weight = bsdf.eval_pdf_sample(
-            context, si, si.to_local(light.d), sampler.next_1d(), sampler.next_2d(), inner)
-        mis = dr.select(light.delta, 1, power_heuristic(light.pdf, p))
-        sought = dr.select(lit, beta * mis * bsdf_value * light_weight, 0)
+        sought = beta * sought_light(scene, si, sampler, candidates, smooth)
+        bsdf_sample, bsdf_weight = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(),
+                                               inner)
 
         emission += dr.select(depth == 0, found, 0)
         direct += dr.select(depth == 1, found, 0) + dr.select(depth == 0, sought, 0)

@@ -1,4 +1,4 @@
-"""The reference: resampled direct light and many samples, through the frame's pixel centres.
+"""The reference: many samples, lights by candidates, through the frame's pixel centres.
 
 Rendered in independent passes, so that it can show progress, be stopped and continued, and say
 how noisy it is itself.

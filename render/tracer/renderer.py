@@ -14,6 +14,7 @@ from onespp.render.frame import Frame
 from onespp.render.mitsuba.variant import mi
 
 from .camera_rays import camera_matrices
+from .candidates import candidates_for
 from .gbuffer import GBUFFER, PrimaryHit
 from .path import trace
 from .replay import replay
@@ -84,7 +85,7 @@ class Renderer(View):
             if set(channels) & {*RADIANCE, *SPLIT, *SHADOW, *GLOSS}:
                 sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
                 radiance = trace(scene, ray, pi, sampler, self.scene.max_depth,
-                                 self.direct == "resampled")
+                                 self.direct == "resampled", self.candidates)
                 unit = dr.opaque(mi.Float, self.stage.unit)
                 planes = {
                     "color": radiance.emission + radiance.direct + radiance.indirect,
@@ -128,7 +129,8 @@ class Renderer(View):
                 jitter = sampler.next_2d()
                 ray, _ = rays.at(x + jitter.x - 0.5, y + jitter.y - 0.5)
                 pi = scene.ray_intersect_preliminary(ray, coherent=True)
-            radiance = trace(scene, ray, pi, sampler, self.scene.max_depth, resampled=True)
+            radiance = trace(scene, ray, pi, sampler, self.scene.max_depth,
+                             candidates=candidates_for(scene))
             color += radiance.emission + radiance.direct + radiance.indirect
             sample += 1
         return color
