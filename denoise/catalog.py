@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import partial
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -44,8 +44,11 @@ OUTLIERS = "+outliers"
 """Ends the name of a method before which outliers are removed."""
 
 
-class Method(Protocol):
-    """What every denoiser offers.
+State = TypeVar("State")
+
+
+class Method(Protocol[State]):
+    """What every denoiser offers; `State` is what it remembers from frame to frame.
 
     Attributes:
         needs: channels that a frame must have. A method may also have `uses`: channels that it
@@ -56,11 +59,11 @@ class Method(Protocol):
     @property
     def needs(self) -> tuple[str, ...]: ...
 
-    def init(self, height: int, width: int) -> Any:
+    def init(self, height: int, width: int) -> State:
         """State before the first frame of a sequence of this size."""
         ...
 
-    def __call__(self, frame: Frame, state: Any) -> tuple[np.ndarray, Any]:
+    def __call__(self, frame: Frame, state: State) -> tuple[np.ndarray, State]:
         """(h, w, 3) float32 denoised radiance, and the state for the next frame."""
         ...
 
@@ -80,7 +83,7 @@ METHODS: Mapping[str, type] = MappingProxyType({
 
 def build(name: str, settings: Mapping[str, str] | None = None,
           outliers: float | None = None,
-          note: Callable[[str], None] | None = None) -> Method:
+          note: Callable[[str], None] | None = None) -> Method[Any]:
     """A method by name, with some parameters given as text: `build("bilateral", {"radius": "8"})`.
 
     The name is one of `METHODS` or `PEERS`. With `outliers`, frames have those removed first that

@@ -25,7 +25,7 @@ from onespp.denoise.catalog import METHODS, PEERS, build
 from onespp.denoise.methods.outliers import RemoveOutliers
 from onespp.denoise.metrics.table import MEASURES
 from onespp.denoise.score.causes import CAUSES, HISTORIES
-from onespp.render.channels import CHANNELS
+from onespp.render.channels import CHANNELS, HALF
 from onespp.scenes import catalog
 from onespp.scenes.hard import HARD
 
@@ -159,9 +159,11 @@ def peers() -> str:
 
 def channels() -> str:
     return table(
-        ("channel", "in the EXR file", "stored as", "background", "meaning, space and unit"),
-        ((f"`{c.name}`", " ".join(f"`{name}`" for name in c.exr), "half" if c.half else "float",
-          f"{c.background:g}", c.about) for c in CHANNELS.values()))
+        ("group", "channel", "in the EXR file", "stored as", "background",
+         "meaning, space and unit"),
+        ((c.group.name.lower(), f"`{c.name}`", " ".join(f"`{name}`" for name in c.exr),
+          "half" if c.stored == HALF else "float", f"{c.background:g}", c.about)
+         for c in CHANNELS.values()))
 
 
 def metrics() -> str:

@@ -1,13 +1,40 @@
 """The channel table: every image that a frame can carry, written once.
 
-A new signal is one row here and one function in `render/gbuffer.py` (or one more output of
-the path tracer). Files, frames, imports and the documentation all read this table.
+A new signal is one row here and one function in `render/tracer/gbuffer.py` (or one more output of
+the path tracer). Files, frames, imports, `--channels`, the report and the documentation all read
+this table.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from types import MappingProxyType
+from typing import Literal
+
+FLOAT, HALF, OBJECT_ID = "float32", "float16", "int32"
+
+
+class Group(Enum):
+    """What channels come together, and when."""
+
+    RADIANCE = "light by scattering events"
+    GUIDES = "what is seen, without noise"
+    SPLIT = "direct light as unshadowed light and the share of it that arrives"
+    SHADOW = "the shadow ray at the first hit"
+    GLOSS = "reflections, of scenes that have glossy surfaces"
+    REPLAY = "samples of the last frame, shaded again"
+    TRUTH = "of references alone"
+
+
+class Display(Enum):
+    """How a picture shows a channel."""
+
+    LIGHT = "tone-mapped, as radiance"
+    AXES = "components of a unit vector, -1 to 1"
+    RANGE = "from its least to its greatest value"
+    UNIT = "0 to 1"
+    OBJECT = "a colour for each object"
 
 
 @dataclass(frozen=True)
@@ -16,18 +43,21 @@ class Channel:
 
     Attributes:
         name: key in `Frame.images`.
+        group: which channels it comes with (`channels_of`).
         exr: channel names in the file, in component order; their number is the number of
             components. One component is an (h, w) image, more are (h, w, c).
-        half: stored as float16 (16-bit data loses nothing that matters there), else float32.
-            In memory everything is float32, `id` int32; other object IDs are int32 as rendered and
-            float32 as read.
+        stored: type in the file. HALF loses nothing that matters there; in memory that is
+            float32. OBJECT_ID is int32 in memory and float32, which viewers expect, in the file.
+        display: how pictures show it.
         background: value of a pixel whose ray hits nothing.
         about: meaning, space and unit.
     """
 
     name: str
+    group: Group
     exr: tuple[str, ...]
-    half: bool
+    stored: Literal["float32", "float16", "int32"]
+    display: Display
     background: float
     about: str
 
@@ -35,69 +65,93 @@ class Channel:
     def components(self) -> int:
         return len(self.exr)
 
+    @property
+    def is_id(self) -> bool:
+        """Whether its values are object IDs: -1, or the index of an object."""
+        return self.stored == OBJECT_ID
+
 
 def _rgb(layer: str) -> tuple[str, ...]:
     return tuple(f"{layer}.{c}" for c in "RGB")
 
 
 _ROWS = (
-    Channel("color", ("R", "G", "B"), False, 0.0,
+    Channel("color", Group.RADIANCE, ("R", "G", "B"), FLOAT, Display.LIGHT, 0.0,
             "radiance, linear Rec. 709; emission + direct + indirect (+ the environment)"),
-    Channel("emission", _rgb("emission"), False, 0.0,
+    Channel("emission", Group.RADIANCE, _rgb("emission"), FLOAT, Display.LIGHT, 0.0,
             "radiance that the visible surface (or the environment) emits itself"),
-    Channel("direct", _rgb("direct"), False, 0.0,
+    Channel("direct", Group.RADIANCE, _rgb("direct"), FLOAT, Display.LIGHT, 0.0,
             "light from emitters scattered once, at the first hit; not demodulated"),
-    Channel("indirect", _rgb("indirect"), False, 0.0,
+    Channel("indirect", Group.RADIANCE, _rgb("indirect"), FLOAT, Display.LIGHT, 0.0,
             "light scattered twice or more; not demodulated"),
-    Channel("unshadowed", _rgb("unshadowed"), False, 0.0,
-            "direct light as if nothing cast a shadow, noise-free (`--direct resampled` only)"),
-    Channel("visibility", ("visibility",), False, 0.0,
-            "share of `unshadowed` that arrives, one noisy sample, may exceed 1 (likewise)"),
-    Channel("light", ("light.X", "light.Y", "light.Z"), False, 0.0,
-            "from the first hit to the point of a light that its shadow ray asked for, world axes, "
-            "scene units; 0: no ray (likewise)"),
-    Channel("light_id", ("light.ID",), False, -1.0,
-            "object ID of that light; -1: none, or the environment (likewise)"),
-    Channel("blocker_distance", ("blocker.Z",), False, 0.0,
-            "from the first hit to what stopped that ray, scene units; 0: nothing did (likewise)"),
-    Channel("blocker_id", ("blocker.ID",), False, -1.0,
-            "object ID of what stopped it; -1: nothing (likewise)"),
-    Channel("specular", _rgb("specular"), False, 0.0,
-            "part of `indirect` whose first direction a glossy or mirror lobe chose"),
-    Channel("hit_distance", ("hit.Z",), False, 0.0,
-            "from the first hit to what the path met next, scene units; 0: nothing"),
-    Channel("hit_id", ("hit.ID",), False, -1.0,
-            "object ID of what the path met next; -1: nothing"),
-    Channel("roughness", ("roughness",), True, 1.0,
-            "GGX alpha of the surface's glossy lobe; 0: a mirror or a hole, 1: no such lobe"),
-    Channel("replay", ("replay.direct", "replay.indirect"), False, -1.0,
-            "luminance of some samples of the frame one number before (in the sequence or not), "
-            "shaded again here; -1: no sample"),
-    Channel("replay_before", ("before.direct", "before.indirect"), False, -1.0,
-            "luminance that the same samples had in that frame; -1: no sample"),
-    Channel("albedo", _rgb("albedo"), True, 0.0,
+    Channel("albedo", Group.GUIDES, _rgb("albedo"), HALF, Display.LIGHT, 0.0,
             "diffuse reflectance in [0, 1]; 1 where the surface has no diffuse part"),
-    Channel("normal", ("N.X", "N.Y", "N.Z"), False, 0.0,
+    Channel("normal", Group.GUIDES, ("N.X", "N.Y", "N.Z"), FLOAT, Display.AXES, 0.0,
             "shading normal, normal and bump maps included, world space, unit length, facing the "
             "camera"),
-    Channel("position", ("P.X", "P.Y", "P.Z"), False, 0.0,
+    Channel("position", Group.GUIDES, ("P.X", "P.Y", "P.Z"), FLOAT, Display.RANGE, 0.0,
             "first hit, world space, scene units (float32: see `depth` far from the origin)"),
-    Channel("depth", ("Z",), False, 0.0,
+    Channel("depth", Group.GUIDES, ("Z",), FLOAT, Display.RANGE, 0.0,
             "camera-space z of the first hit (not distance along the ray), scene units, > 0"),
-    Channel("id", ("ID",), False, -1.0,
+    Channel("id", Group.GUIDES, ("ID",), OBJECT_ID, Display.OBJECT, -1.0,
             "object ID: rank of the shape's name in sorted order; -1: nothing there"),
-    Channel("variance", _rgb("variance"), False, 0.0,
-            "variance of the mean that `color` holds, radiance^2 (references only)"),
+    Channel("unshadowed", Group.SPLIT, _rgb("unshadowed"), FLOAT, Display.LIGHT, 0.0,
+            "direct light as if nothing cast a shadow, noise-free (`--direct resampled` only)"),
+    Channel("visibility", Group.SPLIT, ("visibility",), FLOAT, Display.UNIT, 0.0,
+            "share of `unshadowed` that arrives, one noisy sample, may exceed 1 (likewise)"),
+    Channel("light", Group.SHADOW, ("light.X", "light.Y", "light.Z"), FLOAT, Display.RANGE, 0.0,
+            "from the first hit to the point of a light that its shadow ray asked for, world axes, "
+            "scene units; 0: no ray (likewise)"),
+    Channel("light_id", Group.SHADOW, ("light.ID",), OBJECT_ID, Display.OBJECT, -1.0,
+            "object ID of that light; -1: none, or the environment (likewise)"),
+    Channel("blocker_distance", Group.SHADOW, ("blocker.Z",), FLOAT, Display.RANGE, 0.0,
+            "from the first hit to what stopped that ray, scene units; 0: nothing did (likewise)"),
+    Channel("blocker_id", Group.SHADOW, ("blocker.ID",), OBJECT_ID, Display.OBJECT, -1.0,
+            "object ID of what stopped it; -1: nothing (likewise)"),
+    Channel("specular", Group.GLOSS, _rgb("specular"), FLOAT, Display.LIGHT, 0.0,
+            "part of `indirect` whose first direction a glossy or mirror lobe chose"),
+    Channel("hit_distance", Group.GLOSS, ("hit.Z",), FLOAT, Display.RANGE, 0.0,
+            "from the first hit to what the path met next, scene units; 0: nothing"),
+    Channel("hit_id", Group.GLOSS, ("hit.ID",), OBJECT_ID, Display.OBJECT, -1.0,
+            "object ID of what the path met next; -1: nothing"),
+    Channel("roughness", Group.GLOSS, ("roughness",), HALF, Display.UNIT, 1.0,
+            "GGX alpha of the surface's glossy lobe; 0: a mirror or a hole, 1: no such lobe"),
+    Channel("replay", Group.REPLAY, ("replay.direct", "replay.indirect"), FLOAT, Display.UNIT, -1.0,
+            "luminance of some samples of the frame one number before (in the sequence or not), "
+            "shaded again here; -1: no sample"),
+    Channel("replay_before", Group.REPLAY, ("before.direct", "before.indirect"), FLOAT,
+            Display.UNIT, -1.0,
+            "luminance that the same samples had in that frame; -1: no sample"),
+    Channel("variance", Group.TRUTH, _rgb("variance"), FLOAT, Display.LIGHT, 0.0,
+            "variance of the mean that `color` holds, radiance^2 (older references only)"),
+    Channel("half", Group.TRUTH, _rgb("half"), HALF, Display.LIGHT, 0.0,
+            "first half of a reference's samples minus `color`; `color` minus this is the second "
+            "half (references only)"),
+    Channel("quarter0", Group.TRUTH, _rgb("quarter0"), HALF, Display.LIGHT, 0.0,
+            "first quarter of a reference's samples minus the first half; that half minus this is "
+            "the second quarter (likewise)"),
+    Channel("quarter1", Group.TRUTH, _rgb("quarter1"), HALF, Display.LIGHT, 0.0,
+            "third quarter minus the second half; that half minus this is the fourth (likewise)"),
 )
 
 CHANNELS = MappingProxyType({row.name: row for row in _ROWS})
 
-RADIANCE = ("color", "emission", "direct", "indirect")
-SPLIT = ("unshadowed", "visibility")
-SHADOW = ("light", "light_id", "blocker_distance", "blocker_id")
-GLOSS = ("specular", "hit_distance", "hit_id", "roughness")
-REPLAY = ("replay", "replay_before")
-GBUFFER = ("albedo", "normal", "position", "depth", "id")
-FRAME = RADIANCE + GBUFFER
-REFERENCE = ("color", "variance")
-IDS = ("id", "light_id", "blocker_id", "hit_id")  # of objects
+
+def channels_of(*groups: Group) -> tuple[str, ...]:
+    """Names of the channels of some groups, group by group, in the order of the table.
+
+    Example:
+        >>> channels_of(Group.SPLIT)
+        ('unshadowed', 'visibility')
+    """
+    return tuple(row.name for group in groups for row in _ROWS if row.group is group)
+
+
+RADIANCE, SPLIT, SHADOW, GLOSS, REPLAY = (channels_of(group) for group in (
+    Group.RADIANCE, Group.SPLIT, Group.SHADOW, Group.GLOSS, Group.REPLAY))
+FRAME = channels_of(Group.RADIANCE, Group.GUIDES)
+"""What can be said of every scene."""
+OFFERED = channels_of(*(group for group in Group if group is not Group.TRUTH))
+"""What a frame can carry."""
+REFERENCE = ("color", "half", "quarter0", "quarter1")
+"""What the file of a reference has."""

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from .channels import CHANNELS, IDS
+from .channels import CHANNELS
 from .errors import InputError
 
 
@@ -28,7 +28,8 @@ class Frame:
     Attributes:
         index: frame number in the animation.
         images: channel name -> array; (h, w) for one component, else (h, w, c), float32 (of other
-            floats, methods make that), `id` int32. See `render/channels.py` for meaning and units.
+            floats, methods make that), object IDs int32. See `render/channels.py` for meaning and
+            units.
         camera_from_world, screen_from_world: (4, 4) float64.
         world_from_object: (n, 4, 4) float64, indexed by object ID.
 
@@ -51,11 +52,11 @@ class Frame:
             if name not in CHANNELS:
                 raise InputError(f"frame {self.index} has an unknown channel '{name}'")
             c = CHANNELS[name].components
-            _check_type(image, "fiu" if name in IDS else "f",
+            _check_type(image, "fiu" if CHANNELS[name].is_id else "f",
                         f"channel '{name}' of frame {self.index}")
-            if name == "id" and image.dtype != np.int32 and not _is_whole(image):
-                raise InputError(f"channel 'id' of frame {self.index} has other values than whole "
-                                 "numbers of 32 bits: use int32")
+            if CHANNELS[name].is_id and image.dtype != np.int32 and not _is_whole(image):
+                raise InputError(f"channel '{name}' of frame {self.index} has other values than "
+                                 "whole numbers of 32 bits: use int32")
             if image.ndim != (2 if c == 1 else 3) or (c > 1 and image.shape[2] != c):
                 raise InputError(
                     f"channel '{name}' of frame {self.index} has shape {image.shape}, "

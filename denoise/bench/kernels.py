@@ -38,6 +38,7 @@ from onespp.denoise.peers.oidn import AVAILABLE, Oidn
 from onespp.denoise.run.timed import timed
 from onespp.render.frame import Frame
 from onespp.render.host import backend
+from onespp.render.progress import Progress, silent
 
 from . import machine_limits as limits
 from .probe_frames import probe
@@ -139,18 +140,18 @@ class Bench:
 
 
 def bench(height: int, width: int, repeats: int,
-          on_step: Callable[[int, int], None] = lambda done, total: None) -> Bench:
-    """Measure every kernel. `on_step` is told the rounds done and their number."""
-    total = repeats + 2
+          progress: Progress = silent) -> Bench:
+    """Measure every kernel, in rounds."""
+    total, what = repeats + 2, f"bench {width}x{height}"
     runs = {name: _Run(name, height, width) for name in KERNELS}
     network = _Network(height, width) if AVAILABLE else None
-    on_step(1, total)
+    progress(1, total, what)
     for i in range(repeats):
         for run in (network, *runs.values()):
             if run:
                 run.measure(i % FRAMES)
         measure_one_thread(runs.values(), i % FRAMES)
-        on_step(2 + i, total)
+        progress(2 + i, total, what)
     oidn = median(network.ms) if network else None
     bandwidth, arithmetic = limits.memory_bandwidth(), limits.arithmetic()
     rows = {}
@@ -162,7 +163,7 @@ def bench(height: int, width: int, repeats: int,
                          kernel.operations and kernel.operations * per_ms / arithmetic,
                          median(run.one_thread_ms) / ms if run.one_thread_ms else None,
                          run.peak_mb, run.peak_mb * 2**20 / (height * width))
-    on_step(total, total)
+    progress(total, total, what)
     return Bench(rows, width, height, repeats, oidn, bandwidth, arithmetic, backend.choose(),
                  dr.thread_count(), platform.processor() or platform.machine())
 
@@ -182,7 +183,7 @@ class Scaling:
         return json.dumps(asdict(self), indent=2) + "\n"
 
 
-def scaling(repeats: int, on_step: Callable[[int, int], None] = lambda done, total: None,
+def scaling(repeats: int, progress: Progress = silent,
             sizes: Sequence[tuple[int, int]] = SIZES) -> Scaling:
     """Measure every kernel at each (height, width), in turns."""
     found: dict[str, list[float]] = {}
@@ -195,7 +196,7 @@ def scaling(repeats: int, on_step: Callable[[int, int], None] = lambda done, tot
                 run.measure(i % FRAMES)
         for name, run in runs.items():
             found.setdefault(name, []).append(median(run.ms))
-        on_step(done, len(sizes))
+        progress(done, len(sizes), "bench")
     return Scaling([f"{width}x{height}" for height, width in sizes], repeats, found)
 
 

@@ -25,11 +25,10 @@ def ablate(folders: tuple[Path, ...], method: str, device: str, threads: int | N
     from onespp.denoise.studies.ablation import markdown, variants
 
     methods, results, notes = variants(method), {}, []
-    with progress() as begin:
+    with progress() as report:
         for folder in folders:
             sequence = FrameSequence.open(folder)
-            steps = begin(f"ablation of {method} on {folder.name}", len(sequence.frames))
-            results[folder.name] = ablate_sequence(sequence, methods, steps.advance)
+            results[folder.name] = ablate_sequence(sequence, methods, report)
             m = sequence.manifest
             made = "imported" if m.direct is None else (
                 f"seed {m.seed}, --direct {m.direct} --sampler {m.sampler}")

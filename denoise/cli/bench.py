@@ -32,20 +32,17 @@ def bench(context: click.Context, size: str, repeats: int, scaling: bool, json_t
         return
     height, width = parse_size(size)
     use(device, threads)
-    from onespp.denoise.bench.kernels import SIZES
     from onespp.denoise.bench.kernels import bench as measure
     from onespp.denoise.bench.kernels import scaling as measure_sizes
     from onespp.denoise.report.bench_table import print_bench, print_scaling
 
     if scaling:
-        with progress() as begin:
-            steps = begin("bench", len(SIZES))
-            sizes = measure_sizes(repeats, lambda done, total: steps.advance(done))
+        with progress() as report:
+            sizes = measure_sizes(repeats, report)
         show_or_print(sizes.json_text(), json_to, lambda: print_scaling(sizes))
         return
-    with progress() as begin:
-        steps = begin(f"bench {width}x{height}", repeats + 2)
-        result = measure(height, width, repeats, lambda done, total: steps.advance(done))
+    with progress() as report:
+        result = measure(height, width, repeats, report)
     show_or_print(result.json_text(), json_to, lambda: print_bench(result))
 
 

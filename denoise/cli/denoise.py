@@ -78,14 +78,11 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
     if not frames:
         raise InputError(f"{folder} has no frames yet: render some first")
     paces, runs = {}, {}
-    with progress() as begin:
+    with progress() as report:
         for name, denoiser in denoisers.items():
-            steps = begin(f"denoise {name}", frames)
             with writing(folder, f"denoise-{name}"):
-                runs[name] = denoise_sequence(
-                    sequence, denoiser, name,
-                    lambda done, ms, steps=steps: steps.advance(done, f"({ms:.0f} ms)"),
-                    partial(paces.__setitem__, name), command_line())
+                runs[name] = denoise_sequence(sequence, denoiser, name, report,
+                                              partial(paces.__setitem__, name), command_line())
     for name, pace in paces.items():
         click.echo(f"{name}: {pace}")
     for name, run in runs.items():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from onespp.render.cli.terminal import command_line, named_progress
+from onespp.render.cli.terminal import command_line, progress
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import FrameSequence
 
@@ -26,7 +26,7 @@ def report(folder: Path, channels: str | None) -> None:
     if not (folder / "scores.json").exists():
         score_in(folder)
     names = channels and [name.strip() for name in channels.split(",") if name.strip()]
-    with writing(folder, "report"), named_progress() as tell:
+    with writing(folder, "report"), progress() as tell:
         page = write_report(sequence, read_scores(folder / "scores.json"), names or None, tell,
                             command_line())
     click.echo(f"wrote {page}: open it in a browser")

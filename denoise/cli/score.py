@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from onespp.denoise.score.scorecard import INPUT
-from onespp.render.cli.terminal import command_line, named_progress
+from onespp.render.cli.terminal import command_line, progress
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import FrameSequence
 
@@ -41,7 +41,7 @@ def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = 
 
     sequence = FrameSequence.open(folder)
     others = [FrameSequence.open(other) for other in seeds]
-    with writing(folder, "score"), named_progress() as report:
+    with writing(folder, "score"), progress() as report:
         scores = score_sequence(sequence, list(methods) or None, report, others, command_line())
         if pictures:  # after the scores, which are on disk whatever happens here
             trouble = draw_pictures(sequence, scores, [m for m in methods if m != INPUT] or None,

@@ -33,9 +33,8 @@ def time_(folder: Path, methods: tuple[str, ...], frames: int, rounds: int, devi
 
     sequence = FrameSequence.open(folder)
     chosen = {name: build(name) for name in _names(methods)}
-    with writing(folder, "time"), progress() as begin:
-        steps = begin("time", (rounds + 1) * min(frames, len(sequence.frames)))
-        times = time_methods(sequence, chosen, frames, rounds, steps.advance, command_line())
+    with writing(folder, "time"), progress() as report:
+        times = time_methods(sequence, chosen, frames, rounds, report, command_line())
     for name, t in times.methods.items():
         click.echo(f"{name}: {t.ms:.1f} ms ({t.ms_quartiles[0]:.1f} to {t.ms_quartiles[1]:.1f}), "
                    f"{t.ratio:.2f} times {times.ratio_to} ({t.ratio_quartiles[0]:.2f} to "

@@ -34,7 +34,7 @@ def tune(folders: tuple[Path, ...], method: str, names: tuple[str, ...],
     """
     use(device, threads)
     from onespp.denoise.catalog import build
-    from onespp.denoise.studies.tune import FACTORS, Search, read_case, starting_point
+    from onespp.denoise.studies.tune import Search, read_case, starting_point
 
     start = starting_point(method, pairs(settings), note)
     renamed = renamed_parameters(build(method))
@@ -44,17 +44,9 @@ def tune(folders: tuple[Path, ...], method: str, names: tuple[str, ...],
         raise InputError(f"method '{method}' has no parameter '{unknown[0]}': "
                          f"it has {', '.join(start)}")
     cases = [read_case(FrameSequence.open(folder), build(method)) for folder in folders]
-    with progress() as begin:
-        searched = list(names) or list(start)
-        least = 2 * len(searched) * len(FACTORS)  # trials; a round that gains adds more
-        steps, values = begin(f"tune {method}", least), []
-
-        def show(value: float) -> None:
-            values.append(value)
-            steps.advance(min(len(values), least), f"{max(values):.2f} dB")
-
-        search = Search(method, start, cases, out, show)
-        found, value = search.run(searched)
+    with progress() as report:
+        search = Search(method, start, cases, out, report)
+        found, value = search.run(list(names) or list(start))
     click.echo(f"{value:.2f} dB on {TONE_MAP}, mean over {', '.join(c.name for c in cases)}; "
                f"{search.value(start):.2f} dB at the start; {len(search.tried)} settings tried")
     changed = {k: v for k, v in found.items() if v != start[k]}

@@ -18,7 +18,7 @@ from onespp.denoise.metrics.tonemap import bytes_from_linear
 from onespp.denoise.score.scorecard import INPUT, Scores
 from onespp.render.files.atomic import replacing
 from onespp.render.files.sequence import FrameSequence
-from onespp.render.progress import Progress
+from onespp.render.progress import Progress, silent
 
 from .movie import MovieError, write_movie
 from .panels import GAP, error_legend, error_picture, panel, resize, scaled_size, tile
@@ -30,12 +30,12 @@ WANTED, LARGE_ENOUGH, WIDEST = 480, 640, 3960  # widths in pixels: see `contact_
 
 
 def draw_pictures(sequence: FrameSequence, scores: Scores, movie_methods: list[str] | None = None,
-                  progress: Progress | None = None) -> list[str]:
+                  progress: Progress = silent) -> list[str]:
     """Write all pictures of a sequence, one frame in memory at a time.
 
     Args:
         movie_methods: methods in the movie; default: the one with the highest PSNR.
-        progress: called with (done, total, what).
+        progress: counts pictures.
     Returns:
         one sentence for each picture that could not be made.
     """
@@ -43,20 +43,19 @@ def draw_pictures(sequence: FrameSequence, scores: Scores, movie_methods: list[s
     chosen = spread(scores.frames, SHEETS)
     sheets = {frame: folder / f"sheet_{frame:04d}.png" for frame in chosen}
     total = len(chosen) + len(scores.frames) + 1
-    tell = progress or (lambda done, total, what: None)
     plot_speed_against_error(scores, folder / "speed_against_error.png")
-    tell(1, total, "pictures")
+    progress(1, total, "pictures")
     for n, (frame, path) in enumerate(sheets.items()):
         with replacing(path) as part:
             contact_sheet(sequence, scores, frame).save(part, format="PNG")
-        tell(n + 2, total, "pictures")
+        progress(n + 2, total, "pictures")
     for old in {*folder.glob("sheet_*.png")} - {*sheets.values()}:
         old.unlink()  # of other frames, from when the sequence had others
 
     def told(pictures: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
         for n, picture in enumerate(pictures):
             yield picture
-            tell(len(chosen) + 2 + n, total, "pictures")
+            progress(len(chosen) + 2 + n, total, "pictures")
 
     names = movie_methods if movie_methods is not None else best_method(scores)
     try:

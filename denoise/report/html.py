@@ -19,11 +19,11 @@ import jinja2
 import numpy as np
 
 from onespp.denoise.score.scorecard import INPUT, Scores
-from onespp.render.channels import IDS, RADIANCE
+from onespp.render.channels import CHANNELS, Display
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import all_or_none, write_text
 from onespp.render.files.sequence import FrameSequence
-from onespp.render.progress import Progress
+from onespp.render.progress import Progress, silent
 
 from . import page_images as packed
 from .contact_sheets import display_errors
@@ -34,19 +34,19 @@ from .terminal import caption
 EDGES = np.logspace(-4, 0, 49)
 """Edges of the bins of the histogram; errors below the first are in the first bin."""
 
-_COLOURS = ("unshadowed", "specular", "albedo")  # packed as radiance is
+_KINDS = {Display.LIGHT: packed.RADIANCE, Display.OBJECT: packed.WHOLE}
 
 _SCRIPTS = ("format.js", "work.js", "pixels.js", "plots.js", "charts.js", "view.js",
             "readout.js", "viewer.js", "controls.js", "page.js")
 
 
 def write_report(sequence: FrameSequence, scores: Scores, channels: Iterable[str] | None = None,
-                 progress: Progress | None = None, command: str = "") -> Path:
+                 progress: Progress = silent, command: str = "") -> Path:
     """Write `report/` into the sequence's folder; the path of its index.html.
 
     Args:
         channels: of the frames to show beside colour; default: all that there are.
-        progress: called with (done, total, what). command: the command line, to be shown.
+        progress: counts frames. command: the command line, to be shown.
 
     Raises:
         InputError: an unknown channel, or a file that cannot be read or written.
@@ -71,8 +71,7 @@ def write_report(sequence: FrameSequence, scores: Scores, channels: Iterable[str
             packing = [pool.submit(write, image) for image in images]
             _measure(known, histograms, ranges)
             written |= {part.result() for part in packing}
-            if progress:
-                progress(n + 1, len(scores.frames), "report")
+            progress(n + 1, len(scores.frames), "report")
     shares = {name: [float(f"{x:.4g}") for x in counts / counts.sum()]
               for name, counts in histograms.items() if counts.sum()}
     data = page_data(sequence, scores, shown, ranges, shares, EDGES)
@@ -101,9 +100,7 @@ def _images(sequence: FrameSequence, scores: Scores, frame: int,
     """(where it belongs, image, how it is stored) of all images of a frame."""
     images = sequence.read_frame(frame, ("color", *channels)).images
     for name, image in images.items():
-        kind = (packed.WHOLE if name in IDS else
-                packed.RADIANCE if name in (*RADIANCE, *_COLOURS) else packed.GUIDE)
-        yield f"frame/{name}", image, kind
+        yield f"frame/{name}", image, _KINDS.get(CHANNELS[name].display, packed.GUIDE)
     if sequence.has_reference(frame):
         yield "reference", sequence.read_reference(frame).color, packed.RADIANCE
     for name in scores.methods:
@@ -123,9 +120,9 @@ def _measure(images: dict[str, np.ndarray], histograms: dict[str, np.ndarray],
         for name, error in zip(judged, display_errors(judged.values(), images["reference"])):
             inside = np.clip(error, EDGES[0], EDGES[-1])
             histograms[name] += np.histogram(inside, EDGES)[0]
-    for name in ("depth", "position", "hit_distance", "blocker_distance", "light"):
+    for name, channel in CHANNELS.items():
         image = images.get(f"frame/{name}")
-        if image is not None:
+        if image is not None and channel.display is Display.RANGE:
             values = image[np.isfinite(image) & (image != 0)]
             if values.size:
                 low, high = ranges.get(name, (np.inf, -np.inf))

@@ -47,7 +47,8 @@ def page_data(sequence: FrameSequence, scores: Scores, channels: list[str],
                     for name in scores.ordered()],
         "classes": _classes(scores),
         "edges": [float(f"{e:.4g}") for e in edges],
-        "channels": [{"name": name, "about": CHANNELS[name].about, "range": ranges.get(name)}
+        "channels": [{"name": name, "about": CHANNELS[name].about, "range": ranges.get(name),
+                      "display": CHANNELS[name].display.name.lower()}
                      for name in channels],
         "objects": list(manifest.objects) if "id" in channels else [],
         "timesAre": times_are([m.interleaved for m in scores.methods.values() if m.ms_per_frame]),
@@ -187,7 +188,7 @@ def highlights(scores: Scores) -> list[dict[str, str]]:
                       "about": f"{scores.reference_spp} spp; a perfect image would score this"})
     samples = "" if scores.spp is None else (
         f" at {scores.spp} sample{'s' if scores.spp > 1 else ''} a pixel")
-    tiles.append({"label": "FrameSequence", "value": f"{len(scores.frames)} frames",
+    tiles.append({"label": "Sequence", "value": f"{len(scores.frames)} frames",
                   "about": f"{width}x{height}{samples}"})
     return tiles
 

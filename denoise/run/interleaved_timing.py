@@ -7,7 +7,7 @@ told apart. Ratios are of times of the same step, to the first method's.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 
 import drjit as dr
@@ -21,19 +21,19 @@ from onespp.render.files.sequence import FrameSequence
 from onespp.render.files.times import MethodTime, Times
 from onespp.render.host import backend
 from onespp.render.host.machine import machine
+from onespp.render.progress import Progress, silent
 
 from .timed import timed
 
 
 def time_methods(sequence: FrameSequence, methods: Mapping[str, Method], frames: int = 4,
-                 rounds: int = 5, on_step: Callable[[int], None] = lambda done: None,
-                 command: str = "") -> Times:
+                 rounds: int = 5, progress: Progress = silent, command: str = "") -> Times:
     """Measure methods in turns, and write times.json into the sequence's folder.
 
     Args:
         frames: how many are denoised, from the first one on, again in every round.
         rounds: how many count; one more goes before them.
-        on_step: told how many steps are done.
+        progress: called after each step, in which every method denoises a frame.
         command: the command line, for times.json.
 
     Raises:
@@ -49,12 +49,13 @@ def time_methods(sequence: FrameSequence, methods: Mapping[str, Method], frames:
     names = list(methods)
     states = {name: method.init(*sequence.size) for name, method in methods.items()}
     ms: dict[str, list[float]] = {name: [] for name in names}
-    for step in range((rounds + 1) * len(loaded)):
+    steps = (rounds + 1) * len(loaded)
+    for step in range(steps):
         frame, first = loaded[step % len(loaded)], step % len(names)
         for name in names[first:] + names[:first]:
             (_, states[name]), spent = timed(partial(methods[name], frame, states[name]))
             ms[name].append(spent)
-        on_step(step + 1)
+        progress(step + 1, steps, "time")
     height, width = sequence.size
     times = Times(size=(width, height), frames=len(loaded), steps=rounds * len(loaded),
                   device=backend.choose(), threads=dr.thread_count(),

@@ -34,6 +34,7 @@ from onespp.render.frame import Frame
 from onespp.render.host import backend
 from onespp.render.host.machine import machine
 from onespp.render.host.versions import versions
+from onespp.render.progress import Progress, silent
 
 from .peak_memory import PeakMemory
 from .timed import timed
@@ -109,7 +110,7 @@ class _Files:
 
 
 def denoise_sequence(sequence: FrameSequence, method: Method, name: str,
-                     on_frame: Callable[[int, float], None] = lambda done, ms: None,
+                     progress: Progress = silent,
                      on_pace: Callable[[Pace], None] = lambda pace: None,
                      command: str = "") -> Run:
     """Denoise every frame that is there, in order, and write results and `run.json`.
@@ -119,7 +120,7 @@ def denoise_sequence(sequence: FrameSequence, method: Method, name: str,
 
     Args:
         name: the name of the results' folder.
-        on_frame: told the number of frames done and the milliseconds of the last one.
+        progress: called after each frame, with the milliseconds that it took as the note.
         on_pace: told at the end how fast frames came where reading and writing overlapped.
         command: the command line, for run.json.
     Returns:
@@ -157,7 +158,7 @@ def denoise_sequence(sequence: FrameSequence, method: Method, name: str,
                 files.write(index, image)
                 if done == ALONE:
                     files.overlap, files.seconds, started = True, 0.0, time.perf_counter()
-                on_frame(done, took)
+                progress(done, len(frames), f"denoise {name}", f"({took:.0f} ms)")
             files.finish()
             if len(frames) > ALONE:
                 on_pace(Pace(len(frames) - ALONE, time.perf_counter() - started, denoising,

@@ -6,7 +6,6 @@ default. Nothing is written: frames are denoised in memory, all variants side by
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -18,6 +17,7 @@ from onespp.denoise.score.frame_truth import read_frame_truth
 from onespp.denoise.score.scorer import MethodScorer
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import FrameSequence
+from onespp.render.progress import Progress, silent
 
 COLUMNS = ("psnr_srgb", "flip", "flicker")
 WHOLE = "as it is"
@@ -45,8 +45,8 @@ def variants(name: str) -> dict[str, Method]:
 
 
 def ablate(sequence: FrameSequence, methods: dict[str, Method],
-           on_frame: Callable[[int], None] = lambda done: None) -> list[Variant]:
-    """Denoise and judge the frames that have a reference.
+           progress: Progress = silent) -> list[Variant]:
+    """Denoise and judge the frames that have a reference; `progress` counts frames.
 
     Raises:
         InputError: the sequence has no reference, or a frame lacks what a method needs.
@@ -67,7 +67,7 @@ def ablate(sequence: FrameSequence, methods: dict[str, Method],
         for name, method in methods.items():
             image, states[name] = method(frame, states[name])
             scorers[name].see(number, before.get(number), image, ground, None, COLUMNS[:2])
-        on_frame(done + 1)
+        progress(done + 1, len(frames), f"ablate {sequence.folder.name}")
     return [Variant(name, {c: mean_over_frames(MEASURES[c], {row.frame: row[c]
                                                             for row in judge.rows})
                            for c in COLUMNS})

@@ -18,6 +18,7 @@ from onespp.denoise.metrics.table import measure_pair
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.frame import Frame
+from onespp.render.progress import Progress, silent
 
 MARGIN = 0.3          # dB
 ENERGY_MARGIN = 0.02  # of the reference's mean
@@ -72,8 +73,9 @@ class Row:
 
 
 def judge(folder: FrameSequence, scene: str, event: int | None, diffuse: bool,
-          after_method: Callable[[], None] = lambda: None) -> list[Row]:
-    """Rows of the input and of every method of `METHODS` for a rendered sequence.
+          progress: Progress = silent) -> list[Row]:
+    """Rows of the input and of every method of `METHODS`, which `progress` counts, for a rendered
+    sequence.
 
     Raises:
         InputError: a frame or a reference is missing, or a channel that a method needs.
@@ -87,13 +89,13 @@ def judge(folder: FrameSequence, scene: str, event: int | None, diffuse: bool,
     colors = [t.color for t in truth]
     floor = float(np.mean([reference_floor(t.color, t.variance) for t in truth]))
     rows = []
-    for name in (INPUT, *METHODS):
+    for done, name in enumerate((INPUT, *METHODS), 1):
         images, alone = _denoised(name, frames)
         psnr, yardstick = _decibels(images, colors), _decibels(alone, colors)
         energy = float(np.mean(images, dtype=np.float64) / np.mean(colors, dtype=np.float64))
         bad = sum(int(non_finite(image).sum()) for image in images)
         rows.append(Row(scene, name, psnr, yardstick, event, energy, bad, diffuse, floor))
-        after_method()
+        progress(done, len(METHODS) + 1, f"judge {scene}")
     return rows
 
 

@@ -26,6 +26,7 @@ from onespp.render.errors import InputError
 from onespp.render.files.atomic import read_bytes, write_text
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.frame import Frame
+from onespp.render.progress import Progress, silent
 
 FACTORS = (2.0, 1.4, 1.15)
 LEAST_GAIN = 0.003  # dB; less is not worth another number
@@ -84,18 +85,20 @@ class Search:
     """The search, and all that it has tried, which it can go on from.
 
     Attributes:
-        tried: settings as JSON -> dB.
+        tried: settings as JSON -> dB. expected: how many trials a search without gain takes.
     """
 
     def __init__(self, name: str, start: Settings, cases: list[Case], file: Path | None = None,
-                 on_trial: Callable[[float], None] = lambda value: None) -> None:
-        self.name, self.cases, self.file, self.on_trial = name, cases, file, on_trial
+                 progress: Progress = silent) -> None:
+        self.name, self.cases, self.file, self.progress = name, cases, file, progress
+        self.expected = 1
         self.start = start
         self.tried: dict[str, float] = _read(file) if file and file.exists() else {}
 
     def run(self, names: list[str], factors: tuple[float, ...] = FACTORS
             ) -> tuple[Settings, float]:
         """The best settings found, and their dB."""
+        self.expected = 2 * len(names) * len(factors)  # trials; a round that gains adds more
         best = dict(self.start)
         value = self.value(best)
         for factor in factors:
@@ -124,7 +127,8 @@ class Search:
             self.tried[key] = mean_psnr(method, self.cases)
             if self.file:
                 write_text(self.file, json.dumps(self.tried, indent=1) + "\n")
-        self.on_trial(self.tried[key])
+        self.progress(min(len(self.tried), self.expected), self.expected, f"tune {self.name}",
+                      f"{max(self.tried.values()):.2f} dB")
         return self.tried[key]
 
 

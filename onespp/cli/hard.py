@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import click
 
 from onespp.render.cli.options import device_option, threads_option, use
-from onespp.render.cli.terminal import Steps, progress
+from onespp.render.cli.terminal import progress
+from onespp.render.progress import Progress
 
 from .run import REFERENCE_SPP
 
@@ -39,18 +38,19 @@ def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
     if unknown:
         catalog.load(f"hard/{unknown[0]}")  # says what there is
     rows = []
-    with progress() as begin:
-        steps = begin("hard scenes", len(names or HARD))
+    with progress() as report:
         for number, name in enumerate(names or HARD):
-            rows += _judge_hard(name, out, reference_spp, partial(_within, steps, number, name))
+            rows += _judge_hard(name, out, reference_spp,
+                                _within(report, number, len(names or HARD), name))
     click.echo(markdown(rows))
 
 
-def _judge_hard(name: str, out: Path, reference_spp: int, advance: Callable[[float], None]) -> list:
-    """Rows of one hard scene; `advance` is told the share that is done."""
+def _judge_hard(name: str, out: Path, reference_spp: int, report: Progress) -> list:
+    """Rows of one hard scene."""
     from onespp.denoise.catalog import METHODS
     from onespp.denoise.studies.hard_scenes import judge
-    from onespp.render.job import RenderJob, kept_references, render_sequence
+    from onespp.render.job import RenderJob, render_sequence
+    from onespp.render.references import reference_notes
     from onespp.scenes.hard import HARD
 
     hard = HARD[name]
@@ -59,14 +59,18 @@ def _judge_hard(name: str, out: Path, reference_spp: int, advance: Callable[[flo
                     reference_spp=reference_spp)
     needed = {channel for method in METHODS.values() for channel in method.needs}
     job = replace(job, channels=tuple(dict.fromkeys((*job.channel_names(), *sorted(needed)))))
-    sequence = render_sequence(job, out / name, on_references=lambda done, _: advance(
-        0.5 * done / scene.frames))
-    if kept := kept_references(sequence, sequence.frames, reference_spp):
-        click.echo(f"{name}: {kept}", err=True)
-    judged = iter(range(1, len(METHODS) + 2))
-    return judge(sequence, name, hard.event, hard.diffuse,
-                 lambda: advance(0.5 + 0.5 * next(judged) / (len(METHODS) + 1)))
+    sequence = render_sequence(job, out / name, report=report)
+    for note in reference_notes(sequence, sequence.frames, reference_spp):
+        click.echo(f"{name}: {note}", err=True)
+    return judge(sequence, name, hard.event, hard.diffuse, report)
 
 
-def _within(steps: Steps, number: int, name: str, part: float) -> None:
-    steps.advance(number + part, name)
+def _within(report: Progress, number: int, count: int, name: str) -> Progress:
+    """Of one scene, in thirds: frames, references, judging."""
+    thirds: dict[str, float] = {}
+
+    def tell(done: float, total: float, what: str, note: str = "", /) -> None:
+        thirds[what] = done / total / 3
+        report(number + sum(thirds.values()), count, "hard scenes", name)
+
+    return tell

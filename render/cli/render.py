@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from onespp.render.channels import REPLAY
+from onespp.render.channels import OFFERED, REPLAY
 from onespp.render.errors import InputError
 from onespp.render.files.frame_ranges import parse_frames
 from onespp.render.files.lock import writing
@@ -15,7 +15,7 @@ from onespp.render.host.memory import require_memory
 from onespp.scenes import catalog
 
 from .arguments import parse_size
-from .options import OFFERED, overwrite_option, render_options, use
+from .options import overwrite_option, render_options, use
 from .terminal import command_line, progress
 
 
@@ -45,23 +45,17 @@ def render_to(scene_name: str, out: Path | None, *, frames: str | None, size: st
         raise InputError(f"--seed is {seed}: use 0 or more")
     require_memory(height, width)
     names, added = channel_names(channels)
-    from onespp.render.job import RenderJob, kept_references, render_sequence  # imports Mitsuba
+    from onespp.render.job import RenderJob, render_sequence  # imports Mitsuba
+    from onespp.render.references import reference_notes
 
     job = RenderJob(scene, numbers, height, width, seed, reference_spp, antialias, names,
                     direct, sampler, command_line(), added)
     out = out or Path("data") / scene.name
-    with writing(out, "render", alone=overwrite), progress() as begin:
-        rendering = begin(f"render {scene.name} {width}x{height}", len(numbers))
-        refining = begin(f"reference, {reference_spp} spp", len(numbers)) if reference_spp else None
-        sequence = render_sequence(job, out, overwrite=overwrite, on_frames=rendering.advance,
-                                   on_references=refining.advance if refining else _ignore)
-    if reference_spp and (kept := kept_references(sequence, numbers, reference_spp)):
-        click.echo(kept)
+    with writing(out, "render", alone=overwrite), progress() as report:
+        sequence = render_sequence(job, out, overwrite=overwrite, report=report)
+    for note in reference_notes(sequence, numbers, reference_spp) if reference_spp else ():
+        click.echo(note)
     return sequence
-
-
-def _ignore(done: float, note: str) -> None:
-    pass
 
 
 def channel_names(text: str | None) -> tuple[tuple[str, ...] | None, tuple[str, ...]]:

@@ -9,8 +9,8 @@ import signal
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from typing import Any, NoReturn, TextIO
 
 import click
@@ -80,30 +80,22 @@ class Steps:
 
 
 @contextmanager
-def progress() -> Iterator[Callable[[str, float], Steps]]:
-    """Yields `begin(title, total)`, which starts a part of a job.
+def progress() -> Iterator[Progress]:
+    """Yields `report(done, total, what, note)`; every new `what` is a part of the job.
 
     Shown as bars with an ETA on a terminal, as a plain line every few seconds elsewhere (stderr).
     """
     console = Console(stderr=True)
-    if not console.is_terminal:
-        yield lambda title, total: Steps(title, total, None)
-        return
-    with Bar(TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(),
-             TimeElapsedColumn(), TimeRemainingColumn(), console=console) as bar:
-        yield lambda title, total: Steps(title, total, bar)
-
-
-@contextmanager
-def named_progress() -> Iterator[Progress]:
-    """Yields `report(done, total, what)`; every new `what` is a part of the job."""
+    bar = Bar(TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(),
+              TimeElapsedColumn(), TimeRemainingColumn(), console=console)
     parts: dict[str, Steps] = {}
-    with progress() as begin:
-        def report(done: float, total: float, what: str, /) -> None:
-            if what not in parts:
-                parts[what] = begin(what, total)
-            parts[what].advance(done)
 
+    def report(done: float, total: float, what: str, note: str = "", /) -> None:
+        if what not in parts:
+            parts[what] = Steps(what, total, bar if console.is_terminal else None)
+        parts[what].advance(done, note)
+
+    with bar if console.is_terminal else nullcontext():
         yield report
 
 

@@ -2,7 +2,7 @@
 
     manifest.json               what the sequence is (render/manifest.py)
     frames/0000.exr, .json      a frame's images (render/channels.py) and its matrices
-    reference/0000.exr          ground truth: color, and variance of the mean
+    reference/0000.exr          ground truth: color, and how four parts of it differ
     denoised/METHOD/0000.exr    a result, R, G, B; run.json beside it says how it came to be
     scores.json, scores.csv, pictures/
 
@@ -10,6 +10,11 @@ File names come from frame numbers and checked names, never from what a file say
 renamed into place when it is complete, so that a file that exists is whole, and a command that was
 interrupted goes on where it stopped. References, and what is kept of unfinished ones, cost hours
 and are on the disk before they get their names: no loss of power turns one into an empty file.
+
+A reference's four parts p_0 ... p_3 are in its file as m = color, their mean, in float32, and as
+three differences in float16, of which p_0 = m + h + q_0, p_1 = m + h - q_0, p_2 = m - h + q_1 and
+p_3 = m - h - q_1: those are noise, and half precision takes less than a thousandth of it. Beyond
+65504 they are clipped. References of older versions have the variance of m in their place.
 """
 
 from __future__ import annotations
@@ -24,7 +29,7 @@ from pathlib import Path
 
 import numpy as np
 
-from onespp.render.channels import CHANNELS
+from onespp.render.channels import CHANNELS, HALF, REFERENCE
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 
@@ -48,12 +53,28 @@ class Reference:
         spp: samples a pixel. Of a reference from elsewhere spp is None and the variance NaN.
         parts: (4, h, w, 3) float32, linear radiance: means of four independent sets of spp / 4
             samples, whose mean `color` is. None of a reference of the old kind, or from elsewhere.
+            With parts the variance is estimated between them, so with 3 degrees of freedom:
+            Var = 1/12 * sum_p (p - color)^2, the variance of one of 4 divided by 4.
     """
 
     color: np.ndarray
     variance: np.ndarray
     spp: int | None
     parts: np.ndarray | None = None
+
+    @classmethod
+    def of_parts(cls, parts: np.ndarray, spp: int) -> Reference:
+        """From parts, (4, h, w, 3), rounded as when it is read from a file."""
+        return cls._of_images(_differences(parts), spp)
+
+    @classmethod
+    def _of_images(cls, images: Mapping[str, np.ndarray], spp: int | None) -> Reference:
+        """From the mean and the differences that a file has."""
+        color, half, q0, q1 = (images[name] for name in REFERENCE)
+        with np.errstate(invalid="ignore"):  # of infinite radiance
+            a, b = color + half, color - half
+            variance = (4 * half * half + 2 * q0 * q0 + 2 * q1 * q1) / 12
+            return cls(color, variance, spp, np.stack([a + q0, a - q0, b + q1, b - q1]))
 
     @property
     def halves(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -151,9 +172,10 @@ class FrameSequence:
                                  f"(it has {', '.join(self.manifest.channels)})")
         matrices = self.read_matrices(i)
         images = self._read(self._path("frames", i), names)
-        if "id" in images:
-            images["id"] = object_ids(self._path("frames", i), images["id"],
-                                      len(self.manifest.objects))
+        for name in images:
+            if CHANNELS[name].is_id:
+                images[name] = object_ids(self._path("frames", i), name, images[name],
+                                          len(self.manifest.objects))
         return Frame(i, images, *matrices)
 
     def read_matrices(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -192,14 +214,23 @@ class FrameSequence:
 
     def read_reference(self, i: int) -> Reference:
         path = self._path("reference", i)
+        if self.has_parts(i):
+            return Reference._of_images(self._read(path, REFERENCE), self._spp(path))
         images = self._read(path, ("color", "variance"))
         return Reference(images["color"], images["variance"], self._spp(path))
+
+    def has_parts(self, i: int) -> bool:
+        """Whether a frame's reference has independent parts, so is of no older version."""
+        names = read_header(self._path("reference", i)).channels
+        return any(c in names for name in REFERENCE[1:] for c in CHANNELS[name].exr)
 
     def write_reference(self, i: int, reference: Reference,
                         provenance: Mapping[str, str] | None = None) -> None:
         self._check(i)
-        self._write(self._path("reference", i),
-                    {"color": reference.color, "variance": reference.variance},
+        images = ({"color": reference.color, "variance": reference.variance}
+                  if reference.parts is None
+                  else {**_differences(reference.parts), "color": reference.color})
+        self._write(self._path("reference", i), images,
                     {**(provenance or {}), "spp": str(reference.spp or _UNKNOWN)}, durable=True)
 
     def has_partial(self, i: int) -> bool:
@@ -293,9 +324,7 @@ class FrameSequence:
             if image.shape != expected:
                 raise InputError(f"{path} could not be written because '{name}' has shape "
                                  f"{image.shape}, expected {expected}")
-            if row.half:
-                image = np.clip(image, -_HALF_MAX, _HALF_MAX)
-            image = image.astype(np.float16 if row.half else np.float32)
+            image = _half(image) if row.stored == HALF else image.astype(np.float32)
             planes.update(zip(row.exr, np.moveaxis(np.atleast_3d(image), 2, 0)))
         write_exr(path, planes, header, durable)
 
@@ -309,14 +338,29 @@ class FrameSequence:
         return int(text)
 
 
-def object_ids(path: Path, image: np.ndarray, count: int) -> np.ndarray:
-    """The ID image of a file as int32.
+def _half(image: np.ndarray) -> np.ndarray:
+    """float16, clipped to what it holds."""
+    return np.clip(image, -_HALF_MAX, _HALF_MAX).astype(np.float16)
+
+
+def _differences(parts: np.ndarray) -> dict[str, np.ndarray]:
+    """Mean and differences of four parts, float32, rounded as a file has them."""
+    p = parts.astype(np.float64)
+    with np.errstate(invalid="ignore"):  # of infinite radiance
+        images = {"half": (p[0] + p[1] - p[2] - p[3]) / 4, "quarter0": (p[0] - p[1]) / 2,
+                  "quarter1": (p[2] - p[3]) / 2}
+        images = {name: _half(image).astype(np.float32) for name, image in images.items()}
+        return {"color": p.mean(0).astype(np.float32), **images}
+
+
+def object_ids(path: Path, name: str, image: np.ndarray, count: int) -> np.ndarray:
+    """The image `name` of a file, of object IDs, as int32.
 
     Kernels index with it unchecked, so all but the whole numbers -1 to count - 1 are refused here.
     """
     if not ((image >= -1) & (image < count) & (image == np.floor(image))).all():
-        raise InputError(f"{path} has object IDs other than the whole numbers -1 to {count - 1}: "
-                         "make it again")
+        raise InputError(f"{path} has object IDs other than the whole numbers -1 to {count - 1} in "
+                         f"'{name}': make it again")
     return image.astype(np.int32)
 
 

@@ -315,6 +315,6 @@ def _image(path: Path, names: tuple[str, ...], size: tuple[int, int]) -> np.ndar
 def _read_frame(found: Found, i: int, size: tuple[int, int], objects: int) -> Frame:
     images = {channel: _image(found.file(stem, i), names, size)
               for channel, (stem, names) in _FILES.items()}
-    images["id"] = object_ids(found.file("ID", i), images["id"], objects)
+    images["id"] = object_ids(found.file("ID", i), "id", images["id"], objects)
     matrices = read_mat(found.file("matrix", i))
     return Frame(i, images, matrices[-2], matrices[-1], matrices[:-2])

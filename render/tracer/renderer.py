@@ -57,20 +57,21 @@ class Renderer(View):
         return Frame(index, images, matrices.camera_from_world, matrices.screen_from_world,
                      self.stage.world_from_object())
 
-    def sample_sum(self, index: int, seed: int, number: int, count: int,
-                   antialias: bool = False) -> np.ndarray:
-        """Sum of `count` samples of every pixel of a frame, independent between pass numbers.
+    def sample_sum(self, index: int, seed: int, part: int, count: int, antialias: bool = False,
+                   start: int = 0) -> np.ndarray:
+        """Sum of `count` samples of every pixel of a frame, independent between parts.
 
-        The samples of one pass are stratified, and `count` is best a power of two.
+        The samples of a part are a sequence that is stratified at every power of two.
 
         Args:
+            start: how many samples of the part come before these.
             antialias: samples spread over the pixel (box filter) instead of its centre.
         Returns:
             (h, w, 3) float32, linear radiance times `count`.
         """
         self.stage.set_frame(index)
         with dr.suspend_grad():
-            color = self._trace_samples(index, seed, number, count, antialias)
+            color = self._trace_samples(index, seed, part, start, count, antialias)
         dr.eval(color)
         return self._image(color)
 
@@ -111,16 +112,17 @@ class Renderer(View):
             return {name: planes[name] for name in channels}
 
     @dr.syntax
-    def _trace_samples(self, index: int, seed: int, number: int, count: int, antialias: bool):
+    def _trace_samples(self, index: int, seed: int, part: int, start: int, count: int,
+                       antialias: bool):
         scene = self.stage.mi_scene
         pixel = dr.arange(mi.UInt32, self.height * self.width)
         rays = self.rays()
-        keys = keys_from_seed(seed, REFERENCE_STREAM, index, number)
+        keys = keys_from_seed(seed, REFERENCE_STREAM, index, part)
         x, y = self.centres(pixel)
         centre_ray, _ = rays.at(x, y)
         centre_pi = scene.ray_intersect_preliminary(centre_ray, coherent=True)
-        sample = mi.UInt32(0)
-        end = dr.opaque(mi.UInt32, count)
+        sample = dr.opaque(mi.UInt32, start)
+        end = dr.opaque(mi.UInt32, start + count)
         color = mi.Color3f(0)
         while dr.hint(sample < end, exclude=[scene, rays]):
             sampler = Sobol(keys, pixel, sample)

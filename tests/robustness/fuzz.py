@@ -23,7 +23,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -34,9 +34,12 @@ from onespp.denoise.score.scorecard import read_scores
 from onespp.denoise.score.sequence import measure_sequence
 from onespp.render.errors import InputError
 from onespp.render.files import exr
-from onespp.render.files.sequence import FrameSequence
+from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.files.times import read_times
 from onespp.render.games202.convert import export_games202, import_games202, read_mat
+from onespp.render.references import References
+from onespp.render.tracer.reference import SampleSums
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 from onespp.scenes.description import SceneError
 from tests.cli.test_command import SCENE
@@ -76,18 +79,32 @@ def _read_exr(path: Path) -> None:
 
 def _partial(folder: Path) -> Path:
     sequence = small_sequence(folder, (0,))
-    zeros = np.zeros((*sequence.size, 3))
-    sequence.write_partial(0, {"total": zeros, "squares": zeros, "passes": 2, "samples": 4,
-                               "spp": 16, "antialias": False})
+    _references(sequence)._save(0, SampleSums(
+        tuple((np.zeros((*sequence.size, 3)), n) for n in (8, 8, 4, 4))))
     return folder / "reference/0000.partial.npz"
 
 
-def _read_partial(path: Path) -> None:
-    from onespp.render.job import RenderJob, _saved_progress
+def _references(sequence: FrameSequence) -> References:
+    return References(cast(Renderer, None), sequence, 0, False, {})
 
+
+def _read_partial(path: Path) -> None:
+    _references(FrameSequence.open(path.parents[1]))._saved(0)
+
+
+def _reference(folder: Path) -> Path:
+    sequence = small_sequence(folder, (0,))
+    parts = np.random.default_rng(0).random((4, *sequence.size, 3), np.float32)
+    sequence.write_reference(0, Reference.of_parts(parts, 64))
+    return folder / "reference/0000.exr"
+
+
+def _read_reference(path: Path) -> None:
     sequence = FrameSequence.open(path.parents[1])
-    _saved_progress(RenderJob(catalog.load("box"), (0,), *sequence.size, reference_spp=16),
-                    sequence, 0)
+    _references(sequence)._smaller(0)
+    sequence.has_parts(0)
+    reference = sequence.read_reference(0)
+    assert reference.color.shape == reference.variance.shape == (*sequence.size, 3)
 
 
 def _games202(folder: Path) -> Path:
@@ -150,6 +167,7 @@ READERS = {
     "matrices": Reader(lambda f: small_sequence(f, (0,)).folder / "frames/0000.json",
                        lambda p: FrameSequence.open(p.parents[1]).read_matrices(0), "json"),
     "partial": Reader(_partial, _read_partial),
+    "reference": Reader(_reference, _read_reference),
     "mat": Reader(_games202, read_mat),
     "import": Reader(_games202, _import),
     "import-exr": Reader(lambda f: _games202(f).with_name("ID_0.exr"), _import),

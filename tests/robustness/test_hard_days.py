@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from onespp.render.files.lock import writing
 from onespp.render.files.manifest import Run
 from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.host import backend, memory
+from onespp.render.references import References
 from onespp.render.tracer.reference import SampleSums
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
@@ -324,33 +326,30 @@ def test_a_reference_does_not_depend_on_the_frames_rendered_before(scene_file):
 
 
 @pytest.mark.parametrize(("change", "used"), [
-    ({}, True), ({"samples": 3}, False), ({"passes": 3}, False), ({"passes": -1}, False),
-    ({"passes": 99}, False), ({"passes": [2, 2]}, False), ({"spp": 8}, False),
-    ({"samples": 4.0}, False), ({"antialias": True}, False), ({"total": [1.0]}, False),
-    ({"squares": "text"}, False)])
+    ({}, True), ({"samples": [8, 8, 4]}, False), ({"samples": [-8, 8, 4, 4]}, False),
+    ({"samples": [8, 8, 4, 1 << 40]}, False), ({"samples": [8.0, 8.0, 4.0, 4.0]}, False),
+    ({"samples": 8}, False), ({"antialias": True}, False), ({"antialias": 0}, False),
+    ({"total0": [1.0]}, False), ({"total3": "text"}, False), ({"passes": 3}, False)])
 def test_only_a_whole_state_of_the_same_reference_is_continued(tmp_path, change, used):
     sequence = small_sequence(tmp_path)
     zeros = np.zeros((*sequence.size, 3))
-    sequence.write_partial(0, {"total": zeros, "squares": zeros, "passes": 2, "samples": 4,
-                               "spp": 16, "antialias": False, **change})
-    task = job.RenderJob(catalog.load("box"), (0,), *sequence.size, reference_spp=16)
-    assert (job._saved_progress(task, sequence, 0) is not None) == used
+    sequence.write_partial(0, {**{f"total{part}": zeros for part in range(4)},
+                               "samples": [8, 8, 4, 4], "antialias": False, **change})
+    references = References(cast(Renderer, None), sequence, 0, False, {})
+    assert (references._saved(0) is not None) == used
 
 
-def test_a_pass_that_an_interrupt_tore_is_not_saved():
-    task = job.RenderJob(catalog.load("box"), (0,), 4, 4, reference_spp=16)
-    progress = SampleSums.start(4, 4)
-    progress.add(np.ones((4, 4, 3)), 2)
-    assert job._is_after_a_pass(progress, job._sizes(task, 16))
+def test_an_interrupt_inside_a_sum_leaves_it_as_it_was():
+    sums = SampleSums.start(4, 4)
+    sums.add(0, np.ones((4, 4, 3)), 2)
 
-    class Torn(np.ndarray):
-        def __mul__(self, other):
+    class Interrupted(np.ndarray):
+        def __radd__(self, other):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        progress.add(np.ones((4, 4, 3)).view(Torn), 2)
-    assert (progress.total.max(), progress.squares.max()) == (2.0, 0.5)  # torn indeed
-    assert not job._is_after_a_pass(progress, job._sizes(task, 16))
+        sums.add(0, np.ones((4, 4, 3)).view(Interrupted), 2)
+    assert (sums.parts[0][0].max(), sums.samples) == (1.0, [2, 0, 0, 0])
 
 
 # The environment

@@ -8,6 +8,7 @@ import os
 import struct
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from hypothesis import strategies as st
 from onespp.render.errors import InputError
 from onespp.render.files import atomic
 from onespp.render.files.exr import read_exr, write_exr
-from onespp.render.files.sequence import FrameSequence
+from onespp.render.files.sequence import FrameSequence, Reference
 from tests.support.places import ROOT
 from tests.support.small_sequence import (
     HEIGHT,
@@ -341,9 +342,10 @@ def test_ids_that_point_at_no_object_are_not_read(tmp_path):
     """Kernels gather by ID without a check."""
     sequence = small_sequence(tmp_path)
     path = tmp_path / "frames/0000.exr"
-    for value in (3, -2, 0.5, np.nan, 1e30):
-        planes = {name: np.array(image) for name, image in read_exr(path)[0].items()}
-        planes["ID"][4, 4] = value
+    good, _ = read_exr(path)
+    for plane, value in product(("ID", "light.ID"), (3, -2, 0.5, np.nan, 1e30)):
+        planes = {name: np.array(image) for name, image in good.items()}
+        planes[plane][4, 4] = value
         write_exr(path, planes)
         assert "object IDs other than the whole numbers -1 to 2" in sentence(sequence.read_frame, 0)
 
@@ -355,6 +357,17 @@ def test_a_reference_that_does_not_say_its_samples_is_refused(tmp_path):
     for header in ({}, {"spp": "0"}, {"spp": "many"}, {"spp": "-3"}):
         write_exr(tmp_path / "reference/0000.exr", planes, header)
         assert "samples a pixel" in sentence(sequence.read_reference, 0)
+
+
+def test_a_reference_that_lacks_a_part_is_refused(tmp_path):
+    sequence = small_sequence(tmp_path)
+    parts = np.random.default_rng(0).random((4, *sequence.size, 3), np.float32)
+    sequence.write_reference(0, Reference.of_parts(parts, 64))
+    path = tmp_path / "reference/0000.exr"
+    planes = {name: np.array(image) for name, image in read_exr(path)[0].items()}
+    for missing in ("half.R", "quarter0.G", "quarter1.B", "R"):
+        write_exr(path, {n: p for n, p in planes.items() if n != missing}, {"spp": "64"})
+        assert f"lacks the channel {missing}" in sentence(sequence.read_reference, 0)
 
 
 def test_a_damaged_partial_reference_is_named(tmp_path):

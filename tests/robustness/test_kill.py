@@ -29,8 +29,8 @@ from .fuzz import SCENE
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
 
 # Partial references are saved after every pass here, so that kills meet them.
-PROGRAM = ("import onespp.cli, onespp.render.job; "
-           "onespp.render.job.SECONDS_BETWEEN_SAVES = 0; onespp.cli.main()")
+PROGRAM = ("import onespp.cli, onespp.render.references; "
+           "onespp.render.references.SECONDS_BETWEEN_SAVES = 0; onespp.cli.main()")
 COMMANDS = {
     "render": ("render", "{scene}", "--frames", "0:8", "--size", "64x48", "--reference-spp", "16",
                "--out", "{out}"),

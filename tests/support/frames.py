@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from onespp.render.channels import IDS
+from onespp.render.channels import CHANNELS
 from onespp.render.frame import Frame
 
 WALL_NORMAL = np.array([0.3, 0.1, -1.0]) / np.linalg.norm([0.3, 0.1, -1.0])
@@ -81,6 +81,7 @@ def noisy(frame: Frame, seed: int = 0, sigma: float = 0.3) -> Frame:
 
 def with_images(frame: Frame, **images: np.ndarray) -> Frame:
     """The frame with some images replaced."""
-    typed = {k: np.asarray(v, np.int32 if k in IDS else np.float32) for k, v in images.items()}
+    typed = {k: np.asarray(v, np.int32 if CHANNELS[k].is_id else np.float32)
+             for k, v in images.items()}
     return Frame(frame.index, {**frame.images, **typed}, frame.camera_from_world,
                  frame.screen_from_world, frame.world_from_object)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from onespp.render.channels import CHANNELS, FRAME
+from onespp.render.channels import CHANNELS, OFFERED
 from onespp.render.files.manifest import Manifest
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.frame import Frame
@@ -19,18 +19,18 @@ OBJECTS = ("ball", 'a "quoted" wall', "sol é")
 def small_frame(index: int = 0, seed: int = 0) -> Frame:
     rng = np.random.default_rng([seed, index])
     images = {}
-    for name in FRAME:
-        c = CHANNELS[name].components
-        shape = (HEIGHT, WIDTH) if c == 1 else (HEIGHT, WIDTH, c)
-        images[name] = rng.normal(size=shape).astype(np.float32)
-    images["id"] = rng.integers(-1, len(OBJECTS), (HEIGHT, WIDTH)).astype(np.int32)
+    for name in OFFERED:
+        channel = CHANNELS[name]
+        shape = (HEIGHT, WIDTH, channel.components)[:2 if channel.components == 1 else 3]
+        images[name] = (rng.integers(-1, len(OBJECTS), shape).astype(np.int32) if channel.is_id
+                        else rng.normal(size=shape).astype(np.float32))
     return Frame(index, images, rng.normal(size=(4, 4)), rng.normal(size=(4, 4)) * 1e6,
                  rng.normal(size=(len(OBJECTS), 4, 4)))
 
 
 def small_manifest(**changes: Any) -> Manifest:
     values: dict[str, Any] = {"scene": "small", "frames": (0, 1, 2), "width": WIDTH,
-                              "height": HEIGHT, "channels": FRAME, "objects": OBJECTS}
+                              "height": HEIGHT, "channels": OFFERED, "objects": OBJECTS}
     return Manifest(**{**values, **changes})
 
 

@@ -99,11 +99,11 @@ class Viewer {
     const picture = context.createImageData(DATA.width, DATA.height);
     const out = new Uint32Array(picture.data.buffer);
     const [image, reference] = want.images;
-    const range = DATA.channels.find((c) => c.name === want.channel)?.range;
+    const { range, display } = DATA.channels.find((c) => c.name === want.channel) ?? {};
     if (want.channel === "error") paintError(out, image, reference, ev);
     else if (want.channel === "flip") paintFlip(out, image, ev);
-    else if (/(^|_)id$/.test(want.channel)) paintObjects(out, image);
-    else if (want.channel === "normal") paintRange(out, image, -1, 1);
+    else if (display === "object") paintObjects(out, image);
+    else if (display === "axes") paintRange(out, image, -1, 1);
     else if (range) paintRange(out, image, range[0], range[1] === range[0] ? range[0] + 1 : range[1]);
     else paintRadiance(out, image, ev);
     context.putImageData(picture, 0, 0);

@@ -66,7 +66,7 @@ def test_methods_are_timed_in_turns_and_ratios_are_to_the_first(tmp_path):
             return super().__call__(frame, seen)
 
     times = time_methods(sequence, {"slow": Disturbed(6.0), "fast": Disturbed(2.0)}, rounds=4,
-                         on_step=told.append)
+                         progress=lambda done, *_: told.append(done))
     slow, fast = times.methods["slow"], times.methods["fast"]
     assert (slow.first_ms, fast.first_ms) == pytest.approx((60, 20))
     assert (slow.ms, fast.ms) == pytest.approx((15, 5))  # medians of 1, 1, 2, 2, 3, 3, 4, 4 times

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from onespp.render.channels import CHANNELS, HALF
 from onespp.render.errors import InputError
 from onespp.render.files.exr import read_header
 from onespp.render.files.frame_ranges import format_frames, parse_frames
@@ -29,13 +30,13 @@ from tests.support.small_sequence import (
 )
 
 
-def test_a_frame_comes_back_exactly_and_albedo_to_half(tmp_path):
+def test_a_frame_comes_back_exactly_and_what_is_stored_as_half_to_half(tmp_path):
     sequence = small_sequence(tmp_path / "s")
     frame, back = small_frame(1), FrameSequence.open(tmp_path / "s").read_frame(1)
     for name, image in frame.images.items():
         assert back[name].dtype == image.dtype
         assert back[name].shape == image.shape
-        expected = image.astype(np.float16) if name == "albedo" else image
+        expected = image.astype(np.float16) if CHANNELS[name].stored == HALF else image
         np.testing.assert_array_equal(back[name], expected, err_msg=name)
     np.testing.assert_array_equal(back.camera_from_world, frame.camera_from_world)
     np.testing.assert_array_equal(back.screen_from_world, frame.screen_from_world)
@@ -118,6 +119,49 @@ def test_the_manifest_reads_back_as_written(tmp_path):
     assert json.loads((tmp_path / "s/manifest.json").read_text())["frames"] == "0:3,7"
 
 
+def noisy_parts(size: tuple[int, int], level: float, noise: float) -> np.ndarray:
+    rng = np.random.default_rng(3)
+    return (level + noise * rng.standard_normal((4, *size, 3))).astype(np.float32)
+
+
+@pytest.mark.parametrize(("level", "noise"), [(1.0, 0.3), (200.0, 1e-3), (0.01, 1e-4), (1e3, 1e3)])
+def test_parts_of_a_reference_come_back_but_for_a_thousandth_of_their_noise(tmp_path, level, noise):
+    sequence = small_sequence(tmp_path / "s")
+    parts = noisy_parts(sequence.size, level, noise)
+    made = Reference.of_parts(parts, 64)
+    sequence.write_reference(1, made)
+    assert sequence.has_parts(1)
+    back = sequence.read_reference(1)
+    ulp = 2.0**-22 * level
+    np.testing.assert_array_equal(back.color, made.color)
+    if ulp < 1e-4 * noise:  # else parts are rounded, in float32, before they are subtracted
+        np.testing.assert_array_equal(back.variance, made.variance)
+        np.testing.assert_array_equal(back.parts, made.parts)
+    np.testing.assert_allclose(back.parts, parts, rtol=0, atol=6e-3 * noise + ulp)
+    np.testing.assert_allclose(back.color, parts.mean(0, dtype=np.float64), rtol=1e-7)
+    np.testing.assert_allclose(back.halves, [parts[:2].mean(0), parts[2:].mean(0)], rtol=0,
+                               atol=6e-3 * noise + ulp)
+    assert np.square(back.parts - parts).mean() < (1e-3 * noise) ** 2 + ulp**2
+    expected = parts.astype(np.float64).var(0, ddof=1) / 4
+    np.testing.assert_allclose(back.variance, expected, rtol=0.05, atol=(noise / 100 + ulp)**2)
+    names = read_header(tmp_path / "s/reference/0001.exr").channels
+    assert {n: t.itemsize for n, t in names.items() if len(n) == 1} == {"R": 4, "G": 4, "B": 4}
+    assert sum(t.itemsize for t in names.values()) == 30
+
+
+def test_parts_that_half_precision_cannot_tell_apart_are_clipped_and_stay_finite(tmp_path):
+    sequence = small_sequence(tmp_path / "s")
+    parts = noisy_parts(sequence.size, 1e7, 1e6)
+    sequence.write_reference(0, Reference.of_parts(parts, 16))
+    back = sequence.read_reference(0)
+    np.testing.assert_allclose(back.color, parts.mean(0, dtype=np.float64), rtol=1e-6)
+    assert np.isfinite(back.parts).all()
+    assert np.abs(back.parts - back.color).max() == 2 * 65504
+    parts[0, 0, 0] = np.inf
+    sequence.write_reference(0, Reference.of_parts(parts, 16))
+    assert not np.isfinite(sequence.read_reference(0).color[0, 0]).any()
+
+
 def test_references_results_and_runs_come_back(tmp_path):
     sequence = small_sequence(tmp_path / "s")
     frame = small_frame(1)
@@ -129,6 +173,8 @@ def test_references_results_and_runs_come_back(tmp_path):
     np.testing.assert_array_equal(back.color, frame["color"])
     np.testing.assert_array_equal(back.variance, frame["direct"])
     assert back.spp == 4096
+
+    assert (back.parts, back.halves, sequence.has_parts(1)) == (None, None, False)
 
     assert sequence.methods() == []
     sequence.write_result("a-trous", 0, frame["color"])

@@ -1,4 +1,4 @@
-"""The reference: its variance, its passes, and going on after an interrupt."""
+"""The reference: its parts, their variance, its passes, and going on after an interrupt."""
 
 from __future__ import annotations
 
@@ -10,12 +10,22 @@ import pytest
 import onespp.render.job
 import onespp.render.tracer.reference
 from onespp.render.errors import InputError
-from onespp.render.files.sequence import FrameSequence
+from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.job import RenderJob, render_sequence
 from onespp.render.mitsuba.variant import mi
-from onespp.render.tracer.reference import SampleSums, pass_sizes, render_reference
+from onespp.render.tracer.reference import (
+    LARGEST_PASS,
+    MOST_PATHS,
+    PARTS,
+    SampleSums,
+    next_pass,
+    pass_end,
+    render_reference,
+    whole_spp,
+)
 from onespp.render.tracer.renderer import Renderer
 from onespp.render.tracer.sampler import Sobol, keys_from_seed
+from onespp.scenes import catalog
 from tests.support.furnace import furnace
 
 from .test_renderer import small_scene
@@ -23,41 +33,81 @@ from .test_renderer import small_scene
 SIZE = 12
 
 
-@pytest.mark.parametrize("spp", [2, 7, 8, 9, 64, 100, 513, 1024, 4096])
-def test_passes_add_up(spp):
-    sizes = pass_sizes(spp)
-    assert sum(sizes) == spp
-    assert len(sizes) >= min(spp, 8)
-    assert max(sizes) - min(sizes) <= 1
+def passes_of(end: int, pixels: int = 1) -> list[tuple[int, int]]:
+    """The part and the samples of every pass of a reference with `end` samples a part."""
+    samples, passes = [0] * PARTS, []
+    while (step := next_pass(samples, end, pixels)) is not None:
+        passes.append(step)
+        samples[step[0]] += step[1]
+    return passes
 
 
-def test_a_reference_of_one_sample_is_refused():
-    with pytest.raises(InputError, match="use 2 spp or more"):
-        pass_sizes(1)
+@pytest.mark.parametrize("spp", [1, 2, 7, 8, 9, 64, 100, 513, 1024, 4096])
+def test_parts_get_equally_many_samples_in_turns(spp):
+    end = whole_spp(spp) // PARTS
+    passes = passes_of(end)
+    assert spp <= PARTS * end < spp + PARTS
+    assert [part for part, _ in passes] == list(range(PARTS)) * (len(passes) // PARTS)
+    assert [sum(n for p, n in passes if p == part) for part in range(PARTS)] == [end] * PARTS
+    assert max(n for _, n in passes) <= LARGEST_PASS
+
+
+@pytest.mark.parametrize("pixels", [1, 1920 * 1080, 3000 * 2000, MOST_PATHS + 1])
+def test_a_larger_reference_begins_with_the_passes_of_a_smaller_one(pixels):
+    larger = passes_of(300, pixels)
+    for end in (4, 16, 64, 128):
+        assert passes_of(end, pixels) == larger[:len(passes_of(end, pixels))]
+    assert max(n * pixels for _, n in larger) <= max(MOST_PATHS, pixels)
+    ends = [pass_end(done, pixels) for done in range(300)]
+    assert all(end > done for done, end in enumerate(ends))
+    assert ends == sorted(ends)
+
+
+def test_a_reference_without_samples_is_refused():
+    with pytest.raises(InputError, match="use 4 spp or more"):
+        whole_spp(0)
+
+
+def independent(spp: int, count: int = 32, size: int = SIZE) -> list[Reference]:
+    renderer = Renderer(furnace(0.6, 0.8, 4), size, size)
+    return [render_reference(renderer, 0, seed, spp) for seed in range(count)]
 
 
 def test_the_stated_variance_is_that_of_the_mean():
-    renderer = Renderer(furnace(0.6, 0.8, 4), SIZE, SIZE)
-    references = [render_reference(renderer, 0, seed, 24) for seed in range(60)]
+    references = independent(24, size=24)
     spread = np.var([r.color for r in references], axis=0, ddof=1).mean()
     stated = np.mean([r.variance for r in references])
-    # 60 x 144 pixels x 3 correlated components: the ratio's own deviation is about 3 %.
-    assert stated == pytest.approx(spread, rel=0.12)
+    # 576 pixels x 3 correlated components, 31 and 96 degrees of freedom: the ratio's own deviation
+    # is about 1.5 %.
+    assert stated == pytest.approx(spread, rel=0.1)
 
 
-def test_uneven_passes_estimate_the_same_variance():
-    rng = np.random.default_rng(1)
-    sizes = pass_sizes(37)
-    stated, means = [], []
-    for _ in range(3000):
-        progress = SampleSums.start(1, 1)
-        for n in sizes:
-            progress.add(rng.normal(2.0, 3.0, (n, 1, 1, 3)).sum(0), n)
-        reference = progress.reference()
-        stated.append(reference.variance.mean())
-        means.append(reference.color[0, 0, 0])
-    assert np.mean(stated) == pytest.approx(9 / 37, rel=0.05)
-    assert np.var(means) == pytest.approx(9 / 37, rel=0.1)
+def test_the_noise_of_one_half_says_nothing_about_that_of_the_other():
+    references = independent(8, size=24)
+    truth = np.mean([r.color for r in references], 0, dtype=np.float64)
+    products = []
+    for r in references:
+        a, b = r.halves
+        # The mean of all is not the truth but 1/32 off, which correlates with a and b alike.
+        products.append(((a - truth) * (b - truth) + r.variance / len(references)).mean())
+    z = np.mean(products) / (np.std(products, ddof=1) / len(products) ** 0.5)
+    own = np.mean([np.var(list(r.halves), axis=0, ddof=1).mean() for r in references])
+    assert abs(z) < 4
+    assert np.std(products, ddof=1) / len(products) ** 0.5 < 0.01 * own  # 1 % would be seen
+
+
+def test_what_is_read_is_what_was_rendered(tmp_path):
+    job = RenderJob(small_scene(), [0], SIZE, SIZE, reference_spp=12)
+    found = render_sequence(job, tmp_path / "a").read_reference(0)
+    made = render_reference(Renderer(small_scene(), SIZE, SIZE), 0, 0, 12)
+    assert found.spp == made.spp == 12
+    for name in ("color", "variance", "parts"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(made, name))
+    np.testing.assert_allclose(np.mean(found.halves, 0), found.color, rtol=1e-6)
+    passes = [Renderer(small_scene(), SIZE, SIZE).sample_sum(0, 0, part, 3) / 3
+              for part in range(PARTS)]
+    noise = found.variance.mean() ** 0.5
+    assert np.abs(found.parts - passes).max() < 0.01 * noise  # half precision of the differences
 
 
 def test_sobol_pairs_put_one_point_in_every_elementary_interval():
@@ -105,12 +155,43 @@ def test_an_interrupted_reference_goes_on_to_the_same_bytes(tmp_path, monkeypatc
 
     done = passes
     resumed = render_sequence(job, tmp_path / "stopped")
-    assert passes - done == 5  # of frame 1's 8 passes, 3 were kept
+    assert passes - done == PARTS * 2 - 3  # of frame 1's 8 passes, 3 were kept
     for i in (0, 1):
         for kind in ("frames", "reference"):
             name = f"{kind}/{i:04d}.exr"
             assert (resumed.folder / name).read_bytes() == (undisturbed.folder / name).read_bytes()
     assert resumed.read_partial(1) is None
+
+
+@pytest.mark.parametrize("spp", [40, 64])
+def test_interrupts_at_every_pass_change_no_byte(tmp_path, monkeypatch, spp):
+    monkeypatch.setattr(onespp.render.tracer.reference, "LARGEST_PASS", 8)
+    job = RenderJob(small_scene(), [0], SIZE, SIZE, reference_spp=spp)
+    undisturbed = render_sequence(job, tmp_path / "undisturbed")
+    real, passes = Renderer.sample_sum, 0
+
+    def second_interrupted(self, *arguments):
+        nonlocal passes
+        passes += 1
+        if passes % 2 == 0:
+            raise KeyboardInterrupt
+        return real(self, *arguments)
+
+    monkeypatch.setattr(Renderer, "sample_sum", second_interrupted)
+    stops = 0
+    while True:
+        try:
+            stopped = render_sequence(job, tmp_path / "stopped")
+            break
+        except KeyboardInterrupt:
+            stops += 1
+    assert stops == len(passes_of_job(spp)) - 1
+    name = "reference/0000.exr"
+    assert (stopped.folder / name).read_bytes() == (undisturbed.folder / name).read_bytes()
+
+
+def passes_of_job(spp: int) -> list[tuple[int, int]]:
+    return passes_of(spp // PARTS, SIZE * SIZE)
 
 
 def test_a_complete_folder_is_left_alone(tmp_path, monkeypatch):
@@ -180,12 +261,28 @@ def test_a_damaged_reference_of_more_samples_is_made_anew(tmp_path):
     assert render_sequence(job, tmp_path / "a").read_reference(0).spp == 16
 
 
+def parts_at_once(scene, spp: int) -> Reference:
+    """A reference of whole parts, each in one pass."""
+    renderer, sums = Renderer(scene, SIZE, SIZE), SampleSums.start(SIZE, SIZE)
+    for part in range(PARTS):
+        sums.add(part, renderer.sample_sum(0, 0, part, spp // PARTS), spp // PARTS)
+    return sums.reference()
+
+
+def assert_same(a: Reference, b: Reference) -> None:
+    """But for the rounding of sums, and of differences to half precision."""
+    assert a.spp == b.spp
+    np.testing.assert_allclose(a.color, b.color, rtol=2e-6, atol=1e-7)
+    noise = b.variance.mean() ** 0.5
+    np.testing.assert_allclose(a.parts, b.parts, atol=0.01 * noise)
+
+
 @pytest.mark.parametrize(("asked", "spp", "traced"), [
     (64, 64, 11),    # goes on
-    (16, 20, 0),     # 5 passes of 4 are better than what is asked for
-    (32, 32, 3),     # its 8 passes of 4 are the first ones of 64's
-    (33, 33, 4),     # so are the first five of its 9
-    (24, 24, 8)])    # 8 passes of 3: anew
+    (16, 32, 3),     # a part has 8 samples already: so get the others
+    (32, 32, 3),
+    (36, 36, 7),
+    (24, 32, 3)])
 def test_what_an_interrupt_left_of_a_better_reference_is_used(tmp_path, monkeypatch, asked, spp,
                                                               traced):
     monkeypatch.setattr(onespp.render.tracer.reference, "LARGEST_PASS", 4)
@@ -204,12 +301,7 @@ def test_what_an_interrupt_left_of_a_better_reference_is_used(tmp_path, monkeypa
     found = render_sequence(job, tmp_path / "a").read_reference(0)
     assert (found.spp, len(passes) - 6) == (spp, traced)
     monkeypatch.setattr(Renderer, "sample_sum", real)
-    progress, sizes = SampleSums.start(SIZE, SIZE), [4] * 5 if asked == 16 else pass_sizes(spp)
-    renderer = Renderer(scene, SIZE, SIZE)
-    for number, size in enumerate(sizes):
-        progress.add(renderer.sample_sum(0, 0, number, size), size)
-    np.testing.assert_array_equal(found.color, progress.reference().color)
-    np.testing.assert_array_equal(found.variance, progress.reference().variance)
+    assert_same(found, parts_at_once(scene, spp))
 
 
 def test_an_edited_scene_is_not_taken_for_the_old_one(tmp_path):
@@ -218,24 +310,55 @@ def test_an_edited_scene_is_not_taken_for_the_old_one(tmp_path):
         render_sequence(RenderJob(small_scene(max_depth=4), [0], SIZE, SIZE), tmp_path / "a")
 
 
-@pytest.mark.parametrize(("more", "passes"), [(48, 4), (33, 9)])
-def test_a_reference_of_more_samples_goes_on_from_the_one_of_fewer(tmp_path, monkeypatch, more,
-                                                                   passes):
+@pytest.mark.parametrize(("fewer", "more", "passes"), [(32, 64, 8), (32, 33, 4), (20, 64, 12)])
+def test_a_reference_of_more_samples_goes_on_from_the_one_of_fewer(tmp_path, monkeypatch, fewer,
+                                                                   more, passes):
     monkeypatch.setattr(onespp.render.tracer.reference, "LARGEST_PASS", 4)
-    real, numbers = Renderer.sample_sum, []
+    real, traced = Renderer.sample_sum, []
 
-    def counted(self, index, seed, number, *arguments):
-        numbers.append(number)
-        return real(self, index, seed, number, *arguments)
+    def counted(self, *arguments):
+        traced.append(arguments)
+        return real(self, *arguments)
 
     scene = small_scene()
-    anew = render_sequence(RenderJob(scene, [0], SIZE, SIZE, reference_spp=more), tmp_path / "anew")
-    render_sequence(RenderJob(scene, [0], SIZE, SIZE, reference_spp=32), tmp_path / "raised")
+    render_sequence(RenderJob(scene, [0], SIZE, SIZE, reference_spp=fewer), tmp_path / "raised")
     monkeypatch.setattr(Renderer, "sample_sum", counted)
     raised = render_sequence(RenderJob(scene, [0], SIZE, SIZE, reference_spp=more),
                              tmp_path / "raised")
-    a, b = anew.read_reference(0), raised.read_reference(0)
-    assert numbers == list(range(len(pass_sizes(more))))[-passes:]
-    assert b.spp == more
-    np.testing.assert_allclose(b.color, a.color, rtol=1e-6, atol=1e-7)
-    np.testing.assert_allclose(b.variance, a.variance, rtol=1e-4, atol=1e-7)
+    assert len(traced) == passes
+    assert_same(raised.read_reference(0), parts_at_once(scene, whole_spp(more)))
+
+
+def as_older_versions_wrote(sequence: FrameSequence, i: int) -> None:
+    reference = sequence.read_reference(i)
+    sequence.write_reference(i, Reference(reference.color, reference.variance, reference.spp))
+
+
+def test_a_reference_of_an_older_version_is_kept_and_said_if_it_is_good_enough(tmp_path, call):
+    out = tmp_path / "box"
+    command = ("render", "box", "--size", "12x9", "--out", out, "--frames", "0:2")
+    assert call(*command, "--reference-spp", 16)[0] == 0
+    as_older_versions_wrote(FrameSequence.open(out), 1)
+    before = files(out)
+    assert FrameSequence.open(out).read_reference(1).halves is None
+    code, text, _ = call(*command, "--reference-spp", 16)
+    assert (code, text.splitlines()[0]) == (0, (
+        "kept 1 reference of an older version, without independent halves: scores against them "
+        "have a noise floor (--overwrite replaces them)"))
+    assert files(out) == before
+    code, text, _ = call(*command, "--reference-spp", 32)
+    assert (code, "halves" in text.replace(str(tmp_path), "")) == (0, False)
+    sequence = FrameSequence.open(out)
+    assert [sequence.read_reference(i).spp for i in (0, 1)] == [32, 32]
+    assert sequence.read_reference(1).halves is not None
+    made = render_reference(Renderer(catalog.load("box"), 9, 12), 1, 0, 32)
+    np.testing.assert_array_equal(sequence.read_reference(1).parts, made.parts)  # anew
+
+
+def test_samples_that_the_parts_cannot_share_are_rounded_up_and_said(tmp_path, call):
+    command = ("render", "box", "--size", "12x9", "--frames", "0", "--out", tmp_path / "a")
+    code, text, _ = call(*command, "--reference-spp", 2)
+    assert (code, text.splitlines()[0]) == (
+        0, "references have 4 parts of equally many samples: 4 spp instead of 2")
+    sequence = FrameSequence.open(tmp_path / "a")
+    assert sequence.manifest.reference_spp == sequence.reference_spp(0) == 4
