@@ -110,16 +110,16 @@ def measure(scene: Scene, height: int, width: int, spp: int, renders: int,
     images: tuple[list, list] = ([], [])
     seconds: tuple[list, list] = ([], [])
     for k in range(1, renders + 1):
-        ours, took = _timed(lambda k=k: renderer.sample_sum(frame, 0, k, spp) / spp)
-        images[0].append(ours)
+        image, took = _timed(lambda k=k: renderer.sample_sum(frame, 0, k, spp) / spp)
+        images[0].append(image)
         seconds[0].append(took)
         _, took = _timed(lambda k=k: path.render(k, spp))
         images[1].append(path.through_centres(k, spp))
         seconds[1].append(took)
         report(k, renders, scene.name)
-    measured = [Measured(np.stack(i), np.array(s), spp) for i, s in zip(images, seconds)]
+    ours, theirs = (Measured(np.stack(i), np.array(s), spp) for i, s in zip(images, seconds))
     mi_scene = renderer.stage.mi_scene
-    return compare(scene.name, *measured, len(mi_scene.emitters()), candidates_for(mi_scene))
+    return compare(scene.name, ours, theirs, len(mi_scene.emitters()), candidates_for(mi_scene))
 
 
 def size_of(scene: Scene, pixels: int) -> tuple[int, int]:

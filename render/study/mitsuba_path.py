@@ -1,7 +1,7 @@
 """Mitsuba's `path` on a live scene: what users would render references with.
 
 At the scene's own max_depth, without Russian roulette (which a scene's paths are too short for, and
-which would be an other estimator), with the independent sampler, Mitsuba's default.
+which would be another estimator), with the independent sampler, Mitsuba's default.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from onespp.render.mitsuba.variant import mi
 
 from .candidates import sought_light
 from .lights import DirectLight, power_heuristic, resample_lights, shape_index
-from .sampler import Sampler
+from .sampler import Sampler, Sobol
 
 
 @dataclass
@@ -86,11 +86,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         bsdf = si.bsdf(ray)
 
         # Light that the last direction ran into (for depth 0: what the camera sees itself).
-        reference = dr.zeros(mi.Interaction3f)
-        reference.p = previous_p
-        hit = mi.DirectionSample3f(scene, si, reference)
-        emitter_pdf = scene.pdf_emitter_direction(reference, hit, ~from_delta)
-        found = beta * power_heuristic(bsdf_pdf, emitter_pdf) * hit.emitter.eval(si)
+        found = beta * _found_light(scene, si, previous_p, bsdf_pdf, from_delta)
 
         # Light that this vertex looks for: one shadow ray.
         inner = si.is_valid() & (depth + 1 < max_depth)
@@ -124,6 +120,67 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
 
     radiance = Radiance(emission, direct, indirect, specular, hit_distance, hit_shape)
     return _with_split(radiance, arrived, split)
+
+
+@dr.syntax
+def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sobol,
+                   start: mi.UInt32, end: mi.UInt32, max_depth: int,
+                   candidates: int) -> mi.Color3f:
+    """Sum of samples `start` to `end` - 1 of all lanes: the paths of `trace`, radiance alone.
+
+    One loop over the vertices of all samples: a lane whose path has ended begins the next from the
+    first hit, which is the same for all of them, and waits for no other lane's.
+
+    Args:
+        scene, ray, pi, max_depth, candidates: as for `trace`.
+        sampler: with the lanes' scrambling, at any sample.
+    """
+    first = pi.compute_surface_interaction(ray)
+    total = mi.Float(end - start) * first.emitter(scene).eval(first)
+    ray = mi.Ray3f(ray)
+    pi = mi.PreliminaryIntersection3f(pi)
+    beta, depth = mi.Color3f(0), mi.UInt32(0)
+    previous_p, bsdf_pdf, from_delta = mi.Point3f(0), mi.Float(1), mi.Bool(True)
+    sample = mi.UInt32(start) - 1
+    alive = mi.Bool(False)  # on the way to a hit; at the beginning, all have to start
+    running = first.is_valid() & (start < end) & (max_depth > 1)
+
+    while dr.hint(running, label="samples"):
+        met = pi.compute_surface_interaction(ray, active=alive)
+        found = _found_light(scene, met, previous_p, bsdf_pdf, from_delta)
+        total += dr.select(alive, beta * found, 0)
+
+        alive &= met.is_valid() & (depth + 1 < max_depth)
+        sample += dr.select(alive, mi.UInt32(0), 1)
+        sampler.go_on(sample, ~alive)
+        running = sample < end
+        beta, depth = dr.select(alive, beta, 1), dr.select(alive, depth, 0)
+        si = dr.select(alive, met, first)
+
+        bsdf = si.bsdf()
+        smooth = running & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        total += beta * sought_light(scene, si, sampler, candidates, smooth)
+        bsdf_sample, bsdf_weight = bsdf.sample(mi.BSDFContext(), si, sampler.next_1d(),
+                                               sampler.next_2d(), running)
+        ray = si.spawn_ray(si.to_world(bsdf_sample.wo))
+        beta *= bsdf_weight
+        bsdf_pdf = mi.Float(bsdf_sample.pdf)
+        from_delta = mi.has_flag(bsdf_sample.sampled_type, mi.BSDFFlags.Delta)
+        previous_p = mi.Point3f(si.p)
+        alive = running & (dr.max(beta) > 0)
+        depth += 1
+        pi = scene.ray_intersect_preliminary(ray, coherent=False, active=alive)
+    return total
+
+
+def _found_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, previous_p: mi.Point3f,
+                 bsdf_pdf: mi.Float, from_delta: mi.Bool) -> mi.Color3f:
+    """Radiance of what a direction from `previous_p` met, weighed against light sampling."""
+    reference = dr.zeros(mi.Interaction3f)
+    reference.p = previous_p
+    hit = mi.DirectionSample3f(scene, si, reference)
+    emitter_pdf = scene.pdf_emitter_direction(reference, hit, ~from_delta)
+    return power_heuristic(bsdf_pdf, emitter_pdf) * hit.emitter.eval(si)
 
 
 def _with_split(radiance: Radiance, arrived: mi.Color3f, split: DirectLight | None) -> Radiance:
