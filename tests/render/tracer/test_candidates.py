@@ -37,15 +37,15 @@ def scene_of(*lights: Shape) -> Scene:
         Camera(look_at((0, 2.2, 5), (0, 0.5, 0)), 40), 1, WIDTH, HEIGHT, 3)
 
 
-def many() -> Scene:
-    """200 lamps, few of which bring most of the light."""
+def many(lamps: int = 200) -> Scene:
+    """Lamps, few of which bring most of the light."""
     rng = np.random.default_rng(5)
     down = rotate((1, 0, 0), 90)
     return scene_of(*(
         Shape(f"lamp{k}", Rectangle(), BLACK,
               translate((-3.5 + 0.37 * (k % 20), 2 + rng.random(), -3 + 0.65 * (k // 20))) @ down
               @ scale(0.1), tuple(2 * rng.exponential() ** 2 * rng.random(3)))
-        for k in range(200)))
+        for k in range(lamps)))
 
 
 def tiny() -> Scene:
@@ -81,10 +81,10 @@ def test_candidates_have_the_mean_of_mitsubas_path(make, candidates, monkeypatch
 def test_samples_in_one_loop_are_the_paths_of_one_sample_each():
     """Lanes that begin their next sample where a path ends count the same paths as `trace`."""
     renderer = Renderer(catalog.load("box"), HEIGHT, WIDTH)
-    whole = renderer.sample_sum(4, 0, 1, 24)
+    whole = renderer.sample_sum(4, 0, 1, 8)
     scene = renderer.stage.mi_scene
     total = np.zeros_like(whole)
-    for k in range(24):
+    for k in range(8):
         pixel = dr.arange(mi.UInt32, HEIGHT * WIDTH)
         ray, _ = renderer.rays().at(*renderer.centres(pixel))
         sampler = Sobol(keys_from_seed(0, REFERENCE_STREAM, 4, 1), pixel, dr.opaque(mi.UInt32, k))
@@ -94,19 +94,19 @@ def test_samples_in_one_loop_are_the_paths_of_one_sample_each():
         total += np.stack([c.numpy() for c in color], -1).reshape(whole.shape)
     # Other kernels round otherwise, and a ray that grazes an edge passes it in one of them.
     assert np.isclose(whole, total, rtol=1e-3, atol=1e-3).mean() > 0.95
-    parts = renderer.sample_sum(4, 0, 1, 8) + renderer.sample_sum(4, 0, 1, 16, start=8)
+    parts = renderer.sample_sum(4, 0, 1, 2) + renderer.sample_sum(4, 0, 1, 6, start=2)
     np.testing.assert_allclose(whole, parts, rtol=1e-4, atol=1e-4)
 
 
 def test_frames_under_many_lights_have_the_mean_of_samples():
-    renderer = Renderer(many(), HEIGHT, WIDTH, direct="resampled")
+    renderer = Renderer(many(40), HEIGHT, WIDTH, direct="resampled")
     frames = [blocks(renderer.frame(0, seed, ("color",))["color"], BLOCK) for seed in range(24)]
     reference = [blocks(renderer.sample_sum(0, 9, k, 64) / 64, BLOCK) for k in range(8)]
     assert_same_mean(*mean_and_variance(frames), *mean_and_variance(reference))
 
 
 def test_eight_candidates_of_many_lights_quarter_the_variance(monkeypatch):
-    variance = {m: np.var(samples(many(), m, monkeypatch, 10, 8), axis=0).mean() for m in (1, 8)}
+    variance = {m: np.var(samples(many(40), m, monkeypatch, 10, 8), axis=0).mean() for m in (1, 8)}
     assert variance[1] > 4 * variance[8]
 
 
