@@ -42,7 +42,8 @@ class RenderJob:
             what methods read and does not follow from the rest.
         half: store radiance and guides in half precision.
         direct, sampler: the estimator of direct light and the random numbers of the frames, see
-            `render/renderer.py`. (References are always resampled and Sobol.)
+            `render/renderer.py`. (References always compare candidates
+            and are always Sobol.)
         command: the command line, for the manifest.
     """
 

@@ -28,7 +28,7 @@ ROOMS = (
     "onespp.denoise.oracles", "onespp.denoise.jit", "onespp.denoise.metrics",
     "onespp.denoise.geometry", "onespp.denoise",
     "onespp.render.doctor", "onespp.render.trials", "onespp.render.job",
-    "onespp.render.references", "onespp.render.tracer",
+    "onespp.render.references", "onespp.render.study", "onespp.render.tracer",
     "onespp.render.mitsuba", "onespp.render.games202",
     "onespp.render", "onespp.render.files", "onespp.render.host",
     "onespp.render.frame", "onespp.render.channels", "onespp.render.progress",
@@ -43,7 +43,7 @@ ONLY_IN = {  # package -> rooms that may import it
     # trials: what `doctor` tries
     **dict.fromkeys(("matplotlib", "PIL", "jinja2", "imageio_ffmpeg"),
                     r"\.denoise\.report(\.|$)|\.render\.trials$"),
-    "mitsuba": r"\.render\.(tracer|mitsuba|cli|doctor|trials)(\.|$)|\.denoise\.peers\.optix$",
+    "mitsuba": r"\.render\.(study|tracer|mitsuba|cli|doctor|trials)(\.|$)|\.denoise\.peers\.optix$",
 }
 NEVER = {  # module -> what it never imports
     r"^onespp\.denoise\.(metrics|score|geometry|oracles)(\.|$)": r"^drjit",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from onespp.render.cli.arguments import parse_size
-from onespp.render.cli.bench import bench_render
+from onespp.render.cli.bench import bench_reference, bench_render
 from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import progress
 
@@ -26,7 +26,7 @@ def bench(context: click.Context, size: str, repeats: int, scaling: bool, json_t
           device: str, threads: int | None) -> None:
     """Measure the denoising kernels on this machine, against Open Image Denoise and its limits.
 
-    `bench render` times the renderer.
+    `bench render` times the renderer, `bench reference` says what its references are worth.
     """
     if context.invoked_subcommand is not None:
         return
@@ -47,3 +47,4 @@ def bench(context: click.Context, size: str, repeats: int, scaling: bool, json_t
 
 
 bench.add_command(bench_render)
+bench.add_command(bench_reference)

@@ -1,4 +1,4 @@
-"""The command `bench render`: how long a frame takes, against Mitsuba's own integrators."""
+"""The commands `bench render` and `bench reference`: against Mitsuba's own integrators."""
 
 from __future__ import annotations
 
@@ -9,6 +9,10 @@ import click
 from onespp.render.host.memory import require_memory
 
 from .arguments import LARGEST_SIDE
+from .terminal import progress
+
+HEADER = (f"{'scene':24} {'lights':>6} {'M':>2} {'variance':>9} {'time':>6} {'better':>7}        "
+          f"{'s a render':>10}")
 
 
 @click.command("render")
@@ -23,10 +27,48 @@ def bench_render(scene: str, side: int, repeats: int) -> None:
     The same channels at 1 spp, in turns, after a warm-up; medians.
     """
     require_memory(side, side)
-    from onespp.render.tracer.timing import time_frames
+    from onespp.render.study.frames import time_frames
 
     ours, theirs = time_frames(scene, side, repeats)
     ratios = [b / a for a, b in zip(ours, theirs)]
     click.echo(f"{scene} {side}x{side}: {median(ours):.0f} ms, aov around path "
                f"{median(theirs):.0f} ms, {median(ratios):.2f} times as long "
                f"({min(ratios):.2f} to {max(ratios):.2f})")
+
+
+@click.command("reference")
+@click.argument("scenes", nargs=-1, metavar="[SCENES]...")
+@click.option("--pixels", type=click.IntRange(64, LARGEST_SIDE**2), default=4096, show_default=True,
+              metavar="N", help="Pixels of an image, about, in the scene's own shape.")
+@click.option("--spp", type=click.IntRange(1, 1 << 16), default=256, show_default=True, metavar="N",
+              help="Samples a pixel of every render.")
+@click.option("--repeats", type=click.IntRange(3, 1000), default=5, show_default=True, metavar="N",
+              help="Renders of each, of which the median time counts.")
+def bench_reference(scenes: tuple[str, ...], pixels: int, spp: int, repeats: int) -> None:
+    """Measure references of SCENES against mi.render with `path`: error at equal time.
+
+    Default all scenes but the hard ones. The same depth, pixel centres and samples, in turns, after
+    a warm-up. Columns: lights; M, points of them that a vertex compares; how many times the
+    variance of a sample (in clipped sRGB) and the time that `path` has; and their product, how many
+    times less squared error ours has at equal time.
+    """
+    from onespp.render.study.efficiency import measure, size_of
+    from onespp.scenes import catalog
+
+    every = (*catalog.SCENES, *getattr(catalog, "GENERATED", ()))
+    loaded = [catalog.load(name) for name in scenes or every]
+    sizes = [size_of(scene, pixels) for scene in loaded]
+    for height, width in sizes:
+        require_memory(height, width)
+    click.echo(HEADER)
+    rows = []
+    with progress() as report:
+        for scene, (height, width) in zip(loaded, sizes):
+            row = measure(scene, height, width, spp, repeats, report)
+            rows.append(row)
+            click.echo(f"{row.scene:24} {row.lights:6} {row.candidates:2} {row.variance:9.2f} "
+                       f"{row.time:6.2f} {row.better:7.2f} {f'±{row.error:.2f}':6} "
+                       f"{row.seconds:10.2f}")
+    better = [row.better for row in rows]
+    if len(rows) > 1:
+        click.echo(f"median {median(better):.2f}, least {min(better):.2f}")

@@ -3,8 +3,9 @@
 Symbols (Veach 1997): beta, throughput of the path so far over its probability; p, a density over
 solid angle; `depth`, segments behind the current vertex.
 
-The estimator is that of Mitsuba's `path` without Russian roulette (a scene's paths are short).
-It differs in what it returns: radiance split by the number of scattering events, from one primary
+The estimator is that of Mitsuba's `path` without Russian roulette (a scene's paths are short), but
+that a vertex may compare several points of the lights (`candidates.py`). It differs in what it
+returns: radiance split by the number of scattering events, from one primary
 hit that the G-buffer shares; and what a reflection needs: the part of indirect light whose first
 direction was sampled from a glossy or mirror lobe, and what that path met next. Where a surface has
 several lobes, that is an unbiased share of the whole (each direction counts as glossy with the
@@ -19,8 +20,9 @@ import drjit as dr
 
 from onespp.render.mitsuba.variant import mi
 
+from .candidates import sought_light
 from .lights import DirectLight, power_heuristic, resample_lights, shape_index
-from .sampler import Sampler
+from .sampler import Sampler, Sobol
 
 
 @dataclass
@@ -47,7 +49,7 @@ class Radiance:
 
 @dr.syntax
 def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
-          max_depth: int, resampled: bool = False) -> Radiance:
+          max_depth: int, resampled: bool = False, candidates: int = 1) -> Radiance:
     """One path a lane.
 
     Args:
@@ -55,6 +57,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         sampler: random numbers, advanced by the call.
         max_depth: longest path in segments, as in Mitsuba (1: emission, 2: direct light).
         resampled: direct light at the first hit by resampling instead of by MIS.
+        candidates: points of the lights that a vertex compares before it sends its shadow ray.
     """
     context = mi.BSDFContext()
     ray = mi.Ray3f(ray)
@@ -83,11 +86,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         bsdf = si.bsdf(ray)
 
         # Light that the last direction ran into (for depth 0: what the camera sees itself).
-        reference = dr.zeros(mi.Interaction3f)
-        reference.p = previous_p
-        hit = mi.DirectionSample3f(scene, si, reference)
-        emitter_pdf = scene.pdf_emitter_direction(reference, hit, ~from_delta)
-        found = beta * power_heuristic(bsdf_pdf, emitter_pdf) * hit.emitter.eval(si)
+        found = beta * _found_light(scene, si, previous_p, bsdf_pdf, from_delta)
 
         # Light that this vertex looks for: one shadow ray.
         inner = si.is_valid() & (depth + 1 < max_depth)
@@ -95,12 +94,9 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         if dr.hint(resampled, mode="scalar"):
             smooth &= depth > 0
             arrived += dr.select((depth == 1) & ~from_delta, found, 0)
-        light, light_weight = scene.sample_emitter_direction(si, sampler.next_2d(), True, smooth)
-        lit = smooth & (light.pdf != 0)
-        bsdf_value, p, bsdf_sample, bsdf_weight = bsdf.eval_pdf_sample(
-            context, si, si.to_local(light.d), sampler.next_1d(), sampler.next_2d(), inner)
-        mis = dr.select(light.delta, 1, power_heuristic(light.pdf, p))
-        sought = dr.select(lit, beta * mis * bsdf_value * light_weight, 0)
+        sought = beta * sought_light(scene, si, sampler, candidates, smooth)
+        bsdf_sample, bsdf_weight = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(),
+                                               inner)
 
         emission += dr.select(depth == 0, found, 0)
         direct += dr.select(depth == 1, found, 0) + dr.select(depth == 0, sought, 0)
@@ -124,6 +120,67 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
 
     radiance = Radiance(emission, direct, indirect, specular, hit_distance, hit_shape)
     return _with_split(radiance, arrived, split)
+
+
+@dr.syntax
+def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sobol,
+                   start: mi.UInt32, end: mi.UInt32, max_depth: int,
+                   candidates: int) -> mi.Color3f:
+    """Sum of samples `start` to `end` - 1 of all lanes: the paths of `trace`, radiance alone.
+
+    One loop over the vertices of all samples: a lane whose path has ended begins the next from the
+    first hit, which is the same for all of them, and waits for no other lane's.
+
+    Args:
+        scene, ray, pi, max_depth, candidates: as for `trace`.
+        sampler: with the lanes' scrambling, at any sample.
+    """
+    first = pi.compute_surface_interaction(ray)
+    total = mi.Float(end - start) * first.emitter(scene).eval(first)
+    ray = mi.Ray3f(ray)
+    pi = mi.PreliminaryIntersection3f(pi)
+    beta, depth = mi.Color3f(0), mi.UInt32(0)
+    previous_p, bsdf_pdf, from_delta = mi.Point3f(0), mi.Float(1), mi.Bool(True)
+    sample = mi.UInt32(start) - 1
+    alive = mi.Bool(False)  # on the way to a hit; at the beginning, all have to start
+    running = first.is_valid() & (start < end) & (max_depth > 1)
+
+    while dr.hint(running, label="samples"):
+        met = pi.compute_surface_interaction(ray, active=alive)
+        found = _found_light(scene, met, previous_p, bsdf_pdf, from_delta)
+        total += dr.select(alive, beta * found, 0)
+
+        alive &= met.is_valid() & (depth + 1 < max_depth)
+        sample += dr.select(alive, mi.UInt32(0), 1)
+        sampler.go_on(sample, ~alive)
+        running = sample < end
+        beta, depth = dr.select(alive, beta, 1), dr.select(alive, depth, 0)
+        si = dr.select(alive, met, first)
+
+        bsdf = si.bsdf()
+        smooth = running & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        total += beta * sought_light(scene, si, sampler, candidates, smooth)
+        bsdf_sample, bsdf_weight = bsdf.sample(mi.BSDFContext(), si, sampler.next_1d(),
+                                               sampler.next_2d(), running)
+        ray = si.spawn_ray(si.to_world(bsdf_sample.wo))
+        beta *= bsdf_weight
+        bsdf_pdf = mi.Float(bsdf_sample.pdf)
+        from_delta = mi.has_flag(bsdf_sample.sampled_type, mi.BSDFFlags.Delta)
+        previous_p = mi.Point3f(si.p)
+        alive = running & (dr.max(beta) > 0)
+        depth += 1
+        pi = scene.ray_intersect_preliminary(ray, coherent=False, active=alive)
+    return total
+
+
+def _found_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, previous_p: mi.Point3f,
+                 bsdf_pdf: mi.Float, from_delta: mi.Bool) -> mi.Color3f:
+    """Radiance of what a direction from `previous_p` met, weighed against light sampling."""
+    reference = dr.zeros(mi.Interaction3f)
+    reference.p = previous_p
+    hit = mi.DirectionSample3f(scene, si, reference)
+    emitter_pdf = scene.pdf_emitter_direction(reference, hit, ~from_delta)
+    return power_heuristic(bsdf_pdf, emitter_pdf) * hit.emitter.eval(si)
 
 
 def _with_split(radiance: Radiance, arrived: mi.Color3f, split: DirectLight | None) -> Radiance:

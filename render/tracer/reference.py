@@ -1,4 +1,4 @@
-"""The reference: resampled direct light and many samples, through the frame's pixel centres.
+"""The reference: many samples, lights by candidates, through the frame's pixel centres.
 
 Four independent parts of equally many samples, of which two make a half. The product of an image's
 errors against two independent halves has no noise floor, and the parts tell how noisy they are:

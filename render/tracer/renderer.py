@@ -14,8 +14,9 @@ from onespp.render.frame import Frame
 from onespp.render.mitsuba.variant import mi
 
 from .camera_rays import camera_matrices
+from .candidates import candidates_for
 from .gbuffer import GBUFFER, PrimaryHit
-from .path import trace
+from .path import sum_of_samples, trace
 from .replay import replay
 from .sampler import FRAME_STREAM, REFERENCE_STREAM, Sobol, keys_from_seed
 from .view import View
@@ -85,7 +86,7 @@ class Renderer(View):
             if set(channels) & {*RADIANCE, *SPLIT, *SHADOW, *GLOSS}:
                 sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
                 radiance = trace(scene, ray, pi, sampler, self.scene.max_depth,
-                                 self.direct == "resampled")
+                                 self.direct == "resampled", self.candidates)
                 unit = dr.opaque(mi.Float, self.stage.unit)
                 planes = {
                     "color": radiance.emission + radiance.direct + radiance.indirect,
@@ -120,17 +121,18 @@ class Renderer(View):
         x, y = self.centres(pixel)
         centre_ray, _ = rays.at(x, y)
         centre_pi = scene.ray_intersect_preliminary(centre_ray, coherent=True)
-        sample = dr.opaque(mi.UInt32, start)
-        end = dr.opaque(mi.UInt32, start + count)
+        sample, end = dr.opaque(mi.UInt32, start), dr.opaque(mi.UInt32, start + count)
+        candidates = candidates_for(scene)
+        if dr.hint(not antialias, mode="scalar"):
+            return sum_of_samples(scene, centre_ray, centre_pi, Sobol(keys, pixel, sample), sample,
+                                  end, self.scene.max_depth, candidates)
         color = mi.Color3f(0)
         while dr.hint(sample < end, exclude=[scene, rays]):
             sampler = Sobol(keys, pixel, sample)
-            ray, pi = centre_ray, centre_pi
-            if dr.hint(antialias, mode="scalar"):
-                jitter = sampler.next_2d()
-                ray, _ = rays.at(x + jitter.x - 0.5, y + jitter.y - 0.5)
-                pi = scene.ray_intersect_preliminary(ray, coherent=True)
-            radiance = trace(scene, ray, pi, sampler, self.scene.max_depth, resampled=True)
+            jitter = sampler.next_2d()
+            ray, _ = rays.at(x + jitter.x - 0.5, y + jitter.y - 0.5)
+            pi = scene.ray_intersect_preliminary(ray, coherent=True)
+            radiance = trace(scene, ray, pi, sampler, self.scene.max_depth, candidates=candidates)
             color += radiance.emission + radiance.direct + radiance.indirect
             sample += 1
         return color

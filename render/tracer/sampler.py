@@ -86,6 +86,11 @@ class Sobol:
             self.seed = a ^ b ^ keys[1]
             self.index = mi.UInt32(index)
 
+    def go_on(self, index: mi.UInt32, anew: mi.Bool) -> None:
+        """To the first dimension of sample `index` where `anew`; the others are in it already."""
+        self.index = mi.UInt32(index)
+        self.dimension = dr.select(anew, 0, self.dimension)
+
     def next_1d(self) -> mi.Float:
         order, scramble, _ = self._next_seeds()
         return _unit(_owen(dr.brev(_shuffle(self.index, order)), scramble))

@@ -11,6 +11,7 @@ from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Scene
 
 from .camera_rays import PixelRays, pixel_rays
+from .candidates import candidates_for
 from .sampler import BlueNoise, Keys, Pcg, Sampler, Sobol, z_order
 
 DIRECT = ("mis", "resampled")
@@ -27,7 +28,8 @@ class View:
 
     Attributes:
         scene, stage: the description, and what Mitsuba made of it. height, width: pixels.
-        direct: one of `DIRECT`. sampler: one of `SAMPLERS`.
+        direct: one of `DIRECT`. sampler: one of `SAMPLERS`. candidates: points of the lights that
+            a vertex of a frame's path compares, 1 for `--direct mis`.
 
     Raises:
         InputError: a size below 1x1, or an unknown `direct` or `sampler`.
@@ -44,6 +46,7 @@ class View:
             raise InputError(f"the size {width}x{height} is empty: use at least 1x1")
         self.scene, self.height, self.width = scene, height, width
         self.stage = MitsubaScene(scene)
+        self.candidates = 1 if direct == "mis" else candidates_for(self.stage.mi_scene)
 
     def rays(self) -> PixelRays:
         """Rays through points of the image, at the frame that the stage is set to."""

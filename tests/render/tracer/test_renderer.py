@@ -207,11 +207,3 @@ def test_an_empty_size_and_a_stretched_ball_are_refused_in_a_sentence():
     shapes = (*small_scene().shapes, Shape("egg", Sphere(), gray(), scale((1, 2, 1))))
     with pytest.raises(SceneError, match=r"'egg'.*use a mesh"):
         Renderer(small_scene(shapes=shapes), 4, 4)
-
-
-def test_the_benchmark_times_both_renderers():
-    from onespp.render.tracer.timing import time_frames
-
-    ours, theirs = time_frames("box", 16, 2)
-    assert len(ours) == len(theirs) == 2
-    assert min(*ours, *theirs) > 0

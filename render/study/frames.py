@@ -8,9 +8,8 @@ import drjit as dr
 import numpy as np
 
 from onespp.render.mitsuba.variant import mi
+from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
-
-from .renderer import Renderer
 
 WARM_UP = 2
 AOVS = "albedo:albedo,N:sh_normal,P:position,Z:depth,ID:shape_index"

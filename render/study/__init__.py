@@ -1,0 +1,1 @@
+"""What rendering costs and what it is worth, measured against Mitsuba's own integrators."""
