@@ -43,3 +43,17 @@ class Metric:
     most_frames: int | None = None
     estimate: Callable[[Any], Estimate | None] | None = None
     scale: Scale = "mean"
+
+    def text(self, value: float | None, error: float | None = None, bound: bool = False) -> str:
+        """A value for a table: "38.71 ±0.08", "≥ 41.20" of a bound, "-" where there is none.
+
+        Example:
+            >>> row = Metric("db", "dB", lambda a, b: None, "", "dB", True, ".2f", "")
+            >>> row.text(38.712, 0.083), row.text(41.2, bound=True), row.text(None)
+            ('38.71 ±0.08', '≥ 41.20', '-')
+        """
+        if value is None:
+            return "-"
+        if bound:
+            return f"{'≥' if self.higher_is_better else '≤'} {value:{self.format}}"
+        return f"{value:{self.format}}" + ("" if error is None else f" ±{error:{self.format}}")
