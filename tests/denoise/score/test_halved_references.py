@@ -78,7 +78,7 @@ def test_methods_are_paired(sequence):
         error = found.paired_errors["fine"]["rough"]
         assert error == found.paired_errors["rough"]["fine"]
         hits.append(abs(difference - wanted) < 1.96 * error)
-    assert 0.8 <= np.mean(hits)
+    assert np.mean(hits) >= 0.8
     assert set(found.paired_errors) == {INPUT, "rough", "fine"}
 
 
