@@ -13,6 +13,8 @@ import numpy as np
 from onespp.denoise.geometry.correspondence import NOWHERE, carry
 
 from .errors import decibels, mse
+from .estimate import Estimate
+from .halves import Halves, mean_product
 
 
 @dataclass(frozen=True)
@@ -24,12 +26,15 @@ class Step:
         before: the same of the frame before.
         source: (h, w) of `correspondence.previous_pixel`, None without guides.
         still: (h, w) mask of pixels where nothing has changed, None without guides.
+        moved, aligned: halves of b_t(p) - b_{t-1}(p') and b_t(p) - b_{t-1}(p); None without.
     """
 
     now: tuple[np.ndarray, np.ndarray]
     before: tuple[np.ndarray, np.ndarray]
     source: np.ndarray | None
     still: np.ndarray | None
+    moved: Halves | None = None
+    aligned: Halves | None = None
 
 
 def flicker(step: Step) -> float | None:
@@ -58,6 +63,21 @@ def difference_psnr(step: Step) -> float:
     image, reference = (np.subtract(now, before, dtype=np.float64)
                         for now, before in zip(step.now, step.before))
     return decibels(mse(image, reference))
+
+
+def flicker_square(step: Step) -> Estimate | None:
+    """The square of `flicker` by halves; None without, or without a p'."""
+    if step.moved is None or step.source is None:
+        return None
+    change = step.now[0] - carry(step.before[0], step.source)
+    return mean_product(change, step.moved, where=step.source != NOWHERE)
+
+
+def difference_square(step: Step) -> Estimate | None:
+    """The mean square of `difference_psnr` by halves; None without."""
+    if step.aligned is None:
+        return None
+    return mean_product(step.now[0] - step.before[0], step.aligned)
 
 
 def boiling(step: Step) -> float | None:

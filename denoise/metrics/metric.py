@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
+
+from .estimate import Estimate, Scale
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,9 @@ class Metric:
         in_table: whether it has a column on the terminal; the files have them all.
         most_frames: for a slow one, the number of frames it is measured on, spread evenly; None:
             all.
+        estimate: of a quadratic one, the mean square by a reference's halves, from a `Pair` or a
+            `Step`; None without halves, or where it does not apply.
+        scale: what the measure makes of that.
     """
 
     name: str
@@ -35,3 +41,19 @@ class Metric:
     about: str
     in_table: bool = True
     most_frames: int | None = None
+    estimate: Callable[[Any], Estimate | None] | None = None
+    scale: Scale = "mean"
+
+    def text(self, value: float | None, error: float | None = None, bound: bool = False) -> str:
+        """A value for a table: "38.71 ±0.08", "≥ 41.20" of a bound, "-" where there is none.
+
+        Example:
+            >>> row = Metric("db", "dB", lambda a, b: None, "", "dB", True, ".2f", "")
+            >>> row.text(38.712, 0.083), row.text(41.2, bound=True), row.text(None)
+            ('38.71 ±0.08', '≥ 41.20', '-')
+        """
+        if value is None:
+            return "-"
+        if bound:
+            return f"{'≥' if self.higher_is_better else '≤'} {value:{self.format}}"
+        return f"{value:{self.format}}" + ("" if error is None else f" ±{error:{self.format}}")

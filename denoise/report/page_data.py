@@ -39,8 +39,10 @@ def page_data(sequence: FrameSequence, scores: Scores, channels: list[str],
         "scene": scores.scene, "frames": scores.frames, "width": manifest.width,
         "height": manifest.height, "fps": manifest.fps, "hasReference": scores.has_reference,
         "references": [i for i in scores.frames if sequence.has_reference(i)],
-        "floor": scores.reference_floor_db,
-        "floors": [scores.reference_floor_per_frame.get(i) for i in scores.frames],
+        # No score by halves stops at the floor, so no chart shows it.
+        "floor": None if scores.reference_halves else scores.reference_floor_db,
+        "floors": [None if scores.reference_halves else scores.reference_floor_per_frame.get(i)
+                   for i in scores.frames],
         "headline": HEADLINE.name, "toneMap": scores.tone_map,
         "metrics": [_metric(m, scores) for m in metrics],
         "methods": [_method(sequence, scores, name, metrics, histograms.get(name))
@@ -79,9 +81,12 @@ def _method(sequence: FrameSequence, scores: Scores, name: str, metrics: list[Me
         "name": name, "colour": coloured.index(name) if name in coloured else None,
         "ms": method.ms_per_frame, "inTurns": method.interleaved,
         "values": {m.name: method[m.name] for m in metrics},
+        "errors": method.errors, "bounds": method.bounds,
+        "paired": scores.paired_errors.get(name, {}),
         "perFrame": {m.name: over_frames(m.name) for m in metrics},
         "frames": [i for i in scores.frames if i in rows],
-        "classes": {key: {name: row.model_dump() for name, row in split.items()}
+        "classes": {key: {name: {**row.model_dump(), "mse_share": max(0.0, row.mse_share)}
+                          for name, row in split.items()}
                     for key, split in _splits(method).items()},
         "histogram": histogram,
     }
@@ -119,7 +124,8 @@ def table_data(scores: Scores) -> tuple[list[tuple[str, str]], list[tuple[str, l
 
 
 def _measures(method: MethodScore) -> dict[str, str]:
-    return {_heading(m): "-" if (value := method[m.name]) is None else f"{value:{m.format}}"
+    errors = {HEADLINE.name: method.errors.get(HEADLINE.name)}  # the others' are in the files
+    return {_heading(m): m.text(method[m.name], errors.get(m.name), m.name in method.bounds)
             for m in MEASURES.values()}
 
 
@@ -133,13 +139,15 @@ def best_cells(scores: Scores, columns: list[tuple[str, str]]) -> list[set[str]]
     headings = {_heading(m): m for m in MEASURES.values()}
     for heading, _ in columns:
         metric = headings.get(heading)
-        values = [] if metric is None else [
-            v for method in scores.methods.values() if (v := method[metric.name]) is not None]
-        if metric is None or len(values) < 2:
+        judged = [] if metric is None else [
+            (v, method) for method in scores.methods.values()
+            if (v := method[metric.name]) is not None]
+        if metric is None or len(judged) < 2:
             best.append(set())
         else:
             pick = max if metric.higher_is_better else min
-            best.append({f"{pick(values):{metric.format}}"})
+            _, method = pick(judged, key=lambda row: row[0])
+            best.append({_measures(method)[heading]})
     return best
 
 
@@ -182,7 +190,12 @@ def highlights(scores: Scores) -> list[dict[str, str]]:
         tiles.append(_tile(scores, "Best, and fastest" if both else "Best", best))
         if fastest is not None and fastest != best:
             tiles.append(_tile(scores, "Fastest", fastest))
-    if scores.reference_floor_db is not None:
+    if scores.reference_halves:
+        error = max((m.errors.get(HEADLINE.name, 0.0) for m in scores.methods.values()), default=0)
+        tiles.append({"label": "Reference", "value": f"{scores.reference_spp} spp, two halves",
+                      "about": f"{HEADLINE.label} is known to ±{error:.2f} {HEADLINE.unit} or "
+                               "better"})
+    elif scores.reference_floor_db is not None:
         tiles.append({"label": "Noise floor of the reference",
                       "value": f"{scores.reference_floor_db:.1f} {HEADLINE.unit}",
                       "about": f"{scores.reference_spp} spp; a perfect image would score this"})
@@ -200,6 +213,5 @@ def _tile(scores: Scores, label: str, name: str) -> dict[str, str]:
         parts.append(f"{row[f'gain ({HEADLINE.unit})']} {HEADLINE.unit} over the input")
     if row["ms/frame"] != "-":
         parts.append(f"{row['ms/frame']} ms a frame")
-    value = scores.methods[name][HEADLINE.name]
-    return {"label": label, "value": f"{value:{HEADLINE.format}} {HEADLINE.unit}",
+    return {"label": label, "value": f"{row[_heading(HEADLINE)]} {HEADLINE.unit}",
             "about": ", ".join(parts)}

@@ -10,7 +10,7 @@ from rich.table import Table
 from onespp.denoise.metrics.metric import Metric
 from onespp.denoise.metrics.table import HEADLINE, MEASURES
 from onespp.denoise.score.causes import CAUSES, HISTORIES
-from onespp.denoise.score.scorecard import INPUT, MethodScore, Scores
+from onespp.denoise.score.scorecard import INPUT, ClassScore, MethodScore, Scores
 
 PLAIN_WIDTH = 100
 
@@ -44,7 +44,10 @@ def table(scores: Scores) -> Table:
 def cells(scores: Scores, name: str) -> dict[str, str]:
     """Column heading -> text, for one method."""
     method = scores.methods[name]
-    row = {_heading(m): _number(method[m.name], m.format) for m in _COLUMNS}
+    # (Only the headline's error is shown: the others' are in the files, and tables stay narrow.)
+    row = {_heading(m): m.text(method[m.name],
+                               method.errors.get(m.name) if m is HEADLINE else None,
+                               m.name in method.bounds) for m in _COLUMNS}
     gain = None if name == INPUT else _gain(scores, method)
     row[f"gain ({HEADLINE.unit})"] = _number(gain, "+.2f")
     row["ms/frame"] = _number(method.ms_per_frame, ".1f")
@@ -74,7 +77,7 @@ def print_classes(scores: Scores, console: Console | None = None) -> None:
         grid.add_row("of all pixels", *(f"{pixels[c].pixels:.1%}" for c in shown), style="dim")
         for name, row in rows.items():
             grid.add_row(scores.label(name), *(
-                f"{_number(row[c].psnr_srgb, '.1f')} {row[c].mse_share:4.0%}" for c in shown))
+                f"{_class(row[c])} {row[c].mse_share:4.0%}" for c in shown))
         console.print(grid)
 
 
@@ -101,7 +104,11 @@ def caption(scores: Scores) -> str:
     if scores.has_reference:
         parts.append(f"{HEADLINE.label} on {scores.tone_map}, mean over frames")
         parts.append(f"reference {scores.reference_spp or 'of unknown'} spp")
-        if scores.reference_floor_db is not None:
+        if scores.reference_halves:
+            parts[-1] += f" in two halves, {HEADLINE.label} free of its noise but for ±"
+            if scores.flip_floor is not None:
+                parts.append(f"a perfect image would have FLIP {scores.flip_floor:.4f}")
+        elif scores.reference_floor_db is not None:
             parts[-1] += (f", whose own noise caps {HEADLINE.label} at "
                           f"{scores.reference_floor_db:.1f} {HEADLINE.unit}")
     return "; ".join([*parts, "time: median after the first frame, without files"]) + "."
@@ -119,15 +126,28 @@ def _number(value: float | None, form: str) -> str:
     return "-" if value is None else f"{value:{form}}"
 
 
+def _class(score: ClassScore) -> str:
+    error = "" if score.error is None else f" ±{score.error:.1f}"
+    return _number(score.psnr_srgb, ".1f") + error
+
+
 def _gain(scores: Scores, method: MethodScore) -> float | None:
     """dB over the input on the frames that the method has and that count in both means."""
     unfiltered = scores.methods[INPUT]
+    if any(row[HEADLINE.name] is None and row.errors for row in method.per_frame):
+        return _difference(scores, method)
     noisy = {row.frame: row[HEADLINE.name] for row in unfiltered.per_frame}
     gains = {row.frame: db - base for row in method.per_frame
              if (db := row[HEADLINE.name]) is not None and (base := noisy[row.frame]) is not None}
     left_out = {*unfiltered.identical_frames, *method.identical_frames}
     counted = [gain for i, gain in gains.items() if i not in left_out] or list(gains.values())
     return sum(counted) / len(counted) if counted else None
+
+
+def _difference(scores: Scores, method: MethodScore) -> float | None:
+    """Of the sequence's numbers, where single frames have none."""
+    value, base = method[HEADLINE.name], scores.methods[INPUT][HEADLINE.name]
+    return None if value is None or base is None else value - base
 
 
 def _best(scores: Scores) -> set[tuple[str, str]]:

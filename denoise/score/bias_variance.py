@@ -9,6 +9,10 @@ over pixels, colours and frames.
     bias^2   = mean((A - b)^2) - variance / K - v       what none would: blur, lag, colour shift
     MSE      = mean over k of mean((a_k - b)^2) = bias^2 + variance + v
 
+With halves of the reference (`metrics/halves.py`) squares of differences from b are products of
+differences from the two, in which v isn't: it is 0, and bias^2 has a standard error by the noise of
+the reference (what other seeds would change is not in it).
+
 Both are unbiased estimates, so a bias^2 near 0 may come out below it. What the display clips is
 biased: the noisy input has a bias too, though its radiance has none.
 """
@@ -17,7 +21,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from onespp.denoise.metrics.image import pair
+from onespp.denoise.metrics.estimate import Estimate
+from onespp.denoise.metrics.halves import mean_product
+from onespp.denoise.metrics.image import Pair, Target, pair
 from onespp.denoise.metrics.noise_floor import reference_floor
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import first_difference
@@ -37,33 +43,40 @@ def split_errors(sequences: list[FrameSequence], methods: list[str]) -> dict[str
         InputError: the sequences differ in more than the seed, or do not differ in it.
     """
     check_seeds(sequences)
-    sums = {name: np.zeros(3) for name in methods}
-    counts = dict.fromkeys(methods, 0)
+    sums = {name: np.zeros(4) for name in methods}
+    counts, whole = dict.fromkeys(methods, 0), True
     for i in sequences[0].frames:
         if not sequences[0].has_reference(i):
             continue
         reference = sequences[0].read_reference(i)
-        noise = 0.0
-        if np.isfinite(reference.variance).any():
+        target, noise = Target(reference.color, reference.parts), 0.0
+        whole = whole and reference.parts is not None
+        if reference.parts is None and np.isfinite(reference.variance).any():
             noise = 10 ** (-reference_floor(reference.color, reference.variance) / 10)
         for name in methods:
             images = [_read(s, name, i) for s in sequences if _has(s, name, i)]
             if len(images) == len(sequences):
-                sums[name] += _split([pair(image, reference.color).srgb for image in images], noise)
+                sums[name] += _split([pair(image, target) for image in images], noise)
                 counts[name] += 1
     return {name: ErrorSplit(renders=len(sequences), frames=counts[name], mse=float(mse),
-                             bias_squared=float(bias), variance=float(variance))
+                             bias_squared=float(bias), variance=float(variance),
+                             bias_error=float(error / counts[name]) ** 0.5 if whole else None)
             for name in methods if counts[name]
-            for mse, bias, variance in [sums[name] / counts[name]]}
+            for mse, bias, variance, error in [sums[name] / counts[name]]}
 
 
-def _split(images: list[tuple[np.ndarray, np.ndarray]], noise: float) -> np.ndarray:
-    """MSE, bias^2 and variance of one frame."""
-    a = np.stack([image for image, _ in images]).astype(np.float64)
-    b = images[0][1].astype(np.float64)
-    variance = a.var(axis=0, ddof=1).mean()
-    bias = np.mean((a.mean(axis=0) - b) ** 2) - variance / len(a) - noise
-    return np.array([np.mean((a - b) ** 2), bias, variance])
+def _split(images: list[Pair], noise: float) -> np.ndarray:
+    """MSE, bias^2, variance and the variance of bias^2 of one frame."""
+    a = np.stack([image.srgb[0] for image in images]).astype(np.float64)
+    variance, halves = a.var(axis=0, ddof=1).mean(), images[0].target.srgb_halves
+    if halves is None:
+        b = images[0].srgb[1].astype(np.float64)
+        square = Estimate(float(np.mean((a.mean(axis=0) - b) ** 2)), 0.0)
+    elif (square := mean_product(a.mean(axis=0), halves)) is None:
+        raise AssertionError("an image has pixels")
+    # mean over k of (a_k - b)^2, which is (A - b)^2 and the spread of the a_k around A.
+    mse = square.mean + variance * (len(a) - 1) / len(a)
+    return np.array([mse, square.mean - variance / len(a) - noise, variance, square.variance])
 
 
 def check_seeds(sequences: list[FrameSequence]) -> None:

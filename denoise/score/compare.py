@@ -10,6 +10,11 @@ same and are no independent measurements (an AR(1) model of them, a heuristic). 
 where it is more than two standard errors from 0. Time is compared as the logarithm of B_t / A_t,
 without the first frame, in which kernels compile; its error does not know how much the machine's
 speed changes from run to run.
+
+Where A and B have the same reference its noise cancels in d_t almost wholly; what is left, and all
+of it where references differ, is in the scatter of d_t. Of one frame alone there is no scatter:
+then the error is that of both values by their references' noise, which is too large where these are
+the same.
 """
 
 from __future__ import annotations
@@ -53,7 +58,7 @@ class Change(JsonFile):
     Attributes:
         a, b: means over the frames that both have; of time, geometric ones.
         change: of the measure, in its unit; of time, B / A - 1.
-        error: its standard error; None where one frame alone was measured.
+        error: its standard error; None where one frame alone was measured, without halves.
         frames: how many both have.
         verdict: better or worse where the change is beyond its noise, else same.
         failed: worse, and by more than the threshold.
@@ -141,6 +146,8 @@ def _change(name: str, row: Metric, a: MethodScore, b: MethodScore,
     if not np.isfinite(difference).all():
         return None
     mean, error = float(difference.mean()), standard_error(difference)
+    if error is None:
+        error = _of_one_frame(row, a, b)
     mean_a, mean_b = ((math.exp(np.log(x).mean()) if row is TIME else float(x.mean()))
                       for x in (old, new))
     beyond = mean != 0 and error is not None and abs(mean) > SIGMAS * error
@@ -173,6 +180,14 @@ def _common(row: Metric, a: MethodScore, b: MethodScore) -> tuple[np.ndarray, np
     return np.array([old[i] for i in frames]), np.array([new[i] for i in frames])
 
 
+def _of_one_frame(row: Metric, a: MethodScore, b: MethodScore) -> float | None:
+    """Standard error of the difference in the one frame that both have the measure for."""
+    errors = [{r.frame: r.errors[row.name] for r in m.per_frame if row.name in r.errors}
+              for m in (a, b)]
+    common = errors[0].keys() & errors[1].keys()
+    return math.hypot(*(e[i] for e in errors for i in common)) if len(common) == 1 else None
+
+
 def standard_error(values: np.ndarray) -> float | None:
     """Of the mean of (n,) values in order of time; None for fewer than two."""
     n = len(values)
@@ -196,7 +211,8 @@ def _standard(row: Metric) -> Threshold | None:
 
 def _notes(a: Scores, b: Scores) -> Iterator[str]:
     for key, what in (("seed", "seeds"), ("spp", "samples a pixel"),
-                      ("reference_spp", "references")):
+                      ("reference_spp", "references"),
+                      ("reference_halves", "halves of references")):
         if (old := getattr(a, key)) != (new := getattr(b, key)):
             yield f"A and B have different {what}: {old} and {new}."
     if a.frames != b.frames:

@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import ConfigDict, Field, FiniteFloat, field_validator, model_serializer
 
-from onespp.denoise.metrics.table import HEADLINE, MEASURES
+from onespp.denoise.metrics.table import ESTIMATED, HEADLINE, MEASURES
 from onespp.render.files.json_file import JsonFile, format_json, read_json
 
 INPUT = "input"
@@ -37,11 +37,18 @@ class Measured(JsonFile):
 
 
 class FrameScore(Measured):
-    """One frame of one method. ms: time to denoise it, without reading and writing files."""
+    """One frame of one method.
+
+    Attributes:
+        ms: time to denoise it, without reading and writing files.
+        errors: measure -> standard error of its value, of those that halves of the reference
+            give; a measure without a value has none (`estimate.py`: too near to 0 to have dB).
+    """
 
     frame: int
     ms: FiniteFloat | None
     non_finite_pixels: int
+    errors: dict[str, FiniteFloat] = Field(default_factory=dict)
 
 
 class ClassScore(JsonFile):
@@ -49,22 +56,29 @@ class ClassScore(JsonFile):
 
     Attributes:
         pixels: share of all pixels. mse_share: share of the method's squared error.
-        psnr_srgb: dB of the mean squared error in the class; null if it has no pixels.
+        psnr_srgb: dB of the mean squared error in the class; null if it has no pixels, or an
+            error that the reference's halves cannot tell from 0. error: its standard error; null
+            without halves.
     """
 
     pixels: FiniteFloat
     mse_share: FiniteFloat
     psnr_srgb: FiniteFloat | None
+    error: FiniteFloat | None = None
 
 
 class ErrorSplit(JsonFile):
-    """Bias and variance of display values over renders with other seeds (`bias_variance.py`)."""
+    """Bias and variance of display values over renders with other seeds (`bias_variance.py`).
+
+    bias_error: standard error of bias_squared by the reference's noise; null without halves.
+    """
 
     renders: int
     frames: int
     mse: FiniteFloat
     bias_squared: FiniteFloat
     variance: FiniteFloat
+    bias_error: FiniteFloat | None = None
 
 
 class MethodScore(Measured):
@@ -83,6 +97,9 @@ class MethodScore(Measured):
         by_cause, by_history: error by `classes.CAUSES` and `HISTORIES`, over the frames that
             have a frame before them; empty without reference or guides.
         split: bias and variance, where other seeds were given.
+        errors: measure -> standard error of its value, by the noise of the reference alone.
+        bounds: measures whose value is only a bound, on the side of the worse: the truth is as
+            good or better, beyond what the reference can tell.
     """
 
     method: str = ""
@@ -103,6 +120,8 @@ class MethodScore(Measured):
     by_cause: dict[str, ClassScore] = Field(default_factory=dict)
     by_history: dict[str, ClassScore] = Field(default_factory=dict)
     split: ErrorSplit | None = None
+    errors: dict[str, FiniteFloat] = Field(default_factory=dict)
+    bounds: list[str] = Field(default_factory=list)
     per_frame: list[FrameScore]
 
 
@@ -115,6 +134,10 @@ class Scores(JsonFile):
         reference_floor_db: PSNR that a perfect image is expected to get against this noisy
             reference, mean over frames; per frame in `reference_floor_per_frame`.
         reference_non_finite_pixels: sum over frames; such pixels were not judged.
+        reference_halves: whether what is quadratic is by halves of the references, of all frames.
+        flip_floor, ssim_floor: what a perfect image is expected to get against these references.
+        paired_errors: method -> other -> standard error of the difference of their headline
+            values, on the same frames and halves.
         versions, machine: of what rendered the frames.
         commands: command lines that made the sequence, the results, the times and these scores,
             as they were typed, in that order; those that were not recorded are missing.
@@ -131,6 +154,10 @@ class Scores(JsonFile):
     reference_floor_db: FiniteFloat | None
     reference_floor_per_frame: dict[int, FiniteFloat]
     reference_non_finite_pixels: int = 0
+    reference_halves: bool = False
+    flip_floor: FiniteFloat | None = None
+    ssim_floor: FiniteFloat | None = None
+    paired_errors: dict[str, dict[str, FiniteFloat]] = Field(default_factory=dict)
     tone_map: str
     versions: dict[str, str]
     machine: str = ""
@@ -170,12 +197,12 @@ class Scores(JsonFile):
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(["method", "frame", *MEASURES, "ms", "reference_floor_db",
-                         "non_finite_pixels"])
+                         "non_finite_pixels", *(f"{m}_error" for m in ESTIMATED)])
         for name, method in self.methods.items():
             for row in method.per_frame:
                 writer.writerow([name, row.frame, *(row[m] for m in MEASURES), row.ms,
                                  self.reference_floor_per_frame.get(row.frame),
-                                 row.non_finite_pixels])
+                                 row.non_finite_pixels, *(row.errors.get(m) for m in ESTIMATED)])
         return text.getvalue()
 
 

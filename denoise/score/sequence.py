@@ -2,22 +2,24 @@
 
 Streams: two frames in a row of each method are in memory at a time. The number of a sequence is
 the mean of its frames' (for PSNR too: not the PSNR of the pooled squared error, which the worst
-frame would dominate); `means.py` says which frames count.
+frame would dominate); `means.py` says which frames count, and `estimate.py` what a frame is that is
+too good for its reference.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from statistics import fmean
 from typing import Any
 
 import numpy as np
 
 from onespp.denoise.metrics.errors import PSNR_CAP
-from onespp.denoise.metrics.image import non_finite
-from onespp.denoise.metrics.means import identical, mean_decibels, mean_over_frames
-from onespp.denoise.metrics.noise_floor import reference_floor
+from onespp.denoise.metrics.estimate import BOUND, Number
+from onespp.denoise.metrics.means import identical, mean_decibels, sequence_number
+from onespp.denoise.metrics.noise_floor import reference_floor, seen_floors
 from onespp.denoise.metrics.table import HEADLINE, MEASURES, METRICS, spread
 from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.render.errors import InputError
@@ -30,7 +32,8 @@ from onespp.render.progress import Progress
 from .bias_variance import check_seeds, split_errors
 from .commands import commands
 from .cost import cost
-from .frame_truth import read_frame_truth
+from .frame_truth import FrameTruth, read_frame_truth
+from .paired import PairedErrors
 from .scorecard import INPUT, MethodScore, Scores
 from .scorer import MethodScorer
 
@@ -84,25 +87,29 @@ def measure_sequence(sequence: FrameSequence, methods: list[str] | None = None,
     scorers = {name: MethodScorer() for name in (INPUT, *names)}
     chosen = _chosen(sequence, frames)
     known: dict[int, _Known] = {}
+    paired = PairedErrors()
     ground, after = None, {b: a for a, b in pairwise(sequence.frames)}
     for n, number in enumerate(frames):
         before = after.get(number)
         here = ground if n and frames[n - 1] == before else None
         ground, frame = read_frame_truth(sequence, number, here)
         if ground.reference is not None:
-            known[number] = _known(sequence, number, ground.reference)
+            known[number] = _known(sequence, number, ground, number in chosen["flip"])
         metrics = [name for name in METRICS if number in chosen[name]]
+        seen = [INPUT]
         scorers[INPUT].see(number, before, frame["color"], ground, None, metrics)
         for name in names:
             if sequence.has_result(name, number):
                 scorers[name].see(number, before, sequence.read_result(name, number), ground,
                                  runs[name].ms.get(number), metrics)
+                seen.append(name)
+        paired.add({name: e for name in seen if (e := scorers[name].headline) is not None})
         if progress:
             progress(n + 1, len(frames), "score")
     times = read_times(sequence.folder)
     methods_scored = {name: _summary(judge, scorers[INPUT], cost(sequence, runs.get(name), times))
                       for name, judge in scorers.items()}
-    return _scores(sequence, frames, known, methods_scored)
+    return _scores(sequence, frames, known, methods_scored, paired.errors())
 
 
 def _chosen(sequence: FrameSequence, frames: list[int]) -> dict[str, list[int]]:
@@ -113,11 +120,14 @@ def _chosen(sequence: FrameSequence, frames: list[int]) -> dict[str, list[int]]:
 
 @dataclass(frozen=True)
 class _Known:
-    """What was read of a frame's reference; `spp` and `floor` are None where not known."""
+    """What was read of a frame's reference; what is not known, or not measured, is None."""
 
     spp: int | None
     floor: float | None
     non_finite_pixels: int
+    halves: bool
+    flip_floor: float | None = None
+    ssim_floor: float | None = None
 
 
 def _methods(sequence: FrameSequence, wanted: list[str] | None) -> list[str]:
@@ -132,14 +142,23 @@ def _methods(sequence: FrameSequence, wanted: list[str] | None) -> list[str]:
     return [name for name in dict.fromkeys(wanted) if name != INPUT]
 
 
-def _known(sequence: FrameSequence, number: int, reference: Reference) -> _Known:
-    """InputError where so much of a reference is not finite that the rest says little."""
-    lost = int(non_finite(reference.color).sum())
-    if lost > MOST_LOST * reference.color[..., 0].size:
+def _known(sequence: FrameSequence, number: int, ground: FrameTruth, seen: bool) -> _Known:
+    """Of a frame that has a reference. seen: whether its floors of FLIP and SSIM are wanted.
+
+    Raises:
+        InputError: so much of it is not finite that the rest says little.
+    """
+    reference, target = ground.reference, ground.target
+    assert reference is not None
+    assert target is not None
+    lost = int(target.unknown.sum())
+    if lost > MOST_LOST * target.unknown.size:
         raise InputError(f"the reference of frame {number} in {sequence.folder} has {lost} of "
-                         f"{reference.color[..., 0].size} pixels that are not finite: make it "
+                         f"{target.unknown.size} pixels that are not finite: make it "
                          "again, or delete it and the frame is not judged")
-    return _Known(reference.spp, _floor(reference), lost)
+    halves = reference.parts is not None
+    floors = seen_floors(target.parts) if seen and target.parts is not None else (None, None)
+    return _Known(reference.spp, _floor(reference), lost, halves, *floors)
 
 
 def _floor(reference: Reference) -> float | None:
@@ -152,19 +171,26 @@ def _floor(reference: Reference) -> float | None:
 def _summary(judge: MethodScorer, unfiltered: MethodScorer, spent: dict[str, Any]) -> MethodScore:
     """`unfiltered`: the judge of the input."""
     rows = judge.rows
-    means: dict[str, Any] = {}
+    numbers: dict[str, Number] = {}
     for name, row in MEASURES.items():
         untouched = identical(row, {r.frame: r[name] for r in unfiltered.rows})
-        means[name] = mean_over_frames(row, {r.frame: r[name] for r in rows}, untouched)
+        found = sequence_number(row, {r.frame: r[name] for r in rows},
+                                judge.estimates.get(name, {}), untouched)
+        if found is not None:
+            numbers[name] = found
+    values: dict[str, Any] = {name: numbers[name].value if name in numbers else None
+                              for name in MEASURES}
     return MethodScore(
         **spent, non_finite_pixels=sum(row.non_finite_pixels for row in rows),
         identical_frames=identical(HEADLINE, {r.frame: r[HEADLINE.name] for r in rows}),
         by_cause=judge.causes.scores(), by_history=judge.histories.scores(), per_frame=rows,
-        **means)
+        errors={name: n.error for name, n in numbers.items() if n.error is not None},
+        bounds=[name for name, n in numbers.items() if n.bound],
+        **values)
 
 
 def _scores(sequence: FrameSequence, frames: list[int], known: dict[int, _Known],
-            methods: dict[str, MethodScore]) -> Scores:
+            methods: dict[str, MethodScore], paired: dict[str, dict[str, float]]) -> Scores:
     manifest = sequence.manifest
     floors = {frame: k.floor for frame, k in known.items() if k.floor is not None}
     return Scores(
@@ -174,8 +200,16 @@ def _scores(sequence: FrameSequence, frames: list[int], known: dict[int, _Known]
         reference_floor_db=mean_decibels(floors.values()) if floors else None,
         reference_floor_per_frame=floors,
         reference_non_finite_pixels=sum(k.non_finite_pixels for k in known.values()),
+        reference_halves=bool(known) and all(k.halves for k in known.values()),
+        flip_floor=_mean(k.flip_floor for k in known.values()),
+        ssim_floor=_mean(k.ssim_floor for k in known.values()), paired_errors=paired,
         tone_map=TONE_MAP, versions=manifest.versions, machine=manifest.machine,
         notes=list(_notes(manifest.frames, frames, known, methods)), methods=methods)
+
+
+def _mean(values: Iterable[float | None]) -> float | None:
+    known = [v for v in values if v is not None]
+    return fmean(known) if known else None
 
 
 def _notes(wanted: tuple[int, ...], frames: list[int], known: dict[int, _Known],
@@ -191,6 +225,13 @@ def _notes(wanted: tuple[int, ...], frames: list[int], known: dict[int, _Known],
     samples = {k.spp for k in known.values() if k.spp}
     if len(samples) > 1:
         yield f"References have {min(samples)} to {max(samples)} samples a pixel."
+    halved = sum(k.halves for k in known.values())
+    if known and not halved:
+        yield ("References have no halves: every error has their noise in it, and no PSNR can "
+               "exceed their noise floor.")
+    elif halved < len(known):
+        yield (f"{halved} of {len(known)} references have halves; on the others every error has "
+               "their noise in it.")
     holes = {i: k.non_finite_pixels for i, k in known.items() if k.non_finite_pixels}
     if holes:
         yield (f"References have {sum(holes.values())} pixels that are not finite "
@@ -210,6 +251,10 @@ def _notes(wanted: tuple[int, ...], frames: list[int], known: dict[int, _Known],
         if len(method.per_frame) < len(frames):
             yield (f"{name} has {len(method.per_frame)} of {len(frames)} frames; its numbers are "
                    "over these alone.")
+        if method.bounds:
+            yield (f"{', '.join(MEASURES[m].label for m in method.bounds)} of {name}: beyond what "
+                   "the reference can tell; the number is a bound of "
+                   f"{BOUND:g} standard errors.")
         if method.non_finite_pixels:
             yield (f"{name} has {method.non_finite_pixels} non-finite pixels, which were scored "
                    "as black.")

@@ -11,6 +11,7 @@ from onespp.denoise.cli.denoise import denoise
 from onespp.denoise.cli.report import report
 from onespp.denoise.cli.score import score
 from onespp.denoise.cli.time import time_
+from onespp.denoise.cli.truth import truth
 from onespp.denoise.cli.tune import tune
 from onespp.render.cli.render import export, import_, render
 from onespp.render.cli.terminal import run as run_command
@@ -29,7 +30,7 @@ def app() -> None:
 
 
 for command in (scenes, render, denoise, time_, score, run, report, compare, bench, tune, ablate,
-                lead, hard, import_, export, doctor):
+                lead, truth, hard, import_, export, doctor):
     app.add_command(command)
 
 

@@ -93,7 +93,7 @@ class Charts {
     const labels = placeLabels(at, [PLOT.left + 8, 0, size.width, bottom - 2]);
     const mixed = DATA.methods.some((m) => m.inTurns);
     points.forEach((m, i) => {
-      size.node.append(marker(m, at[i].x, at[i].y, [withUnit(m.values[metric.name], metric),
+      size.node.append(marker(m, at[i].x, at[i].y, [known(m, metric),
         `${formatted(m.ms, ".1f")} ms a frame${m.inTurns ? ", in turns" : ""}`], () => this.onMethod(m.name), 6.5, mixed && !m.inTurns));
       const label = labels[i];
       if (label) size.node.append(svg("text", { x: label.x, y: label.y, "text-anchor": label.anchor, class: "name", "aria-hidden": "true" }, m.name));
@@ -135,7 +135,7 @@ class Charts {
     for (const m of shown) {
       const row = m.perFrame[metric.name];
       size.node.append(svg("path", { d: line(row), class: "line", stroke: colourOf(m), role: "img",
-        "aria-label": `${m.name}: ${withUnit(m.values[metric.name], metric)} on average` }));
+        "aria-label": `${m.name}: ${known(m, metric)} on average` }));
       if (of(m).length > 40) continue;
       row.forEach((v, i) => v !== null && size.node.append(
         svg("path", { d: markerPath(m, 2.8), fill: colourOf(m), transform: `translate(${x(i)} ${y(v)})` })));

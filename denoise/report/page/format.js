@@ -21,6 +21,14 @@ function formatted(value, format) {
 const withUnit = (value, metric) =>
   formatted(value, metric.format) + (metric.unit && value !== null ? ` ${metric.unit}` : "");
 
+/** A method's number over the sequence, with its standard error, or as the bound that it is. */
+function known(m, metric) {
+  const value = withUnit(m.values[metric.name], metric);
+  if (m.bounds.includes(metric.name)) return `${metric.higherIsBetter ? "≥" : "≤"} ${value}`;
+  const error = m.errors[metric.name];
+  return error === undefined ? value : `${value} ± ${short(error)}`;
+}
+
 /** Three significant digits, for pixels and axes. */
 const short = (value) =>
   value === 0 ? "0" : !Number.isFinite(value) ? String(value)
