@@ -1,21 +1,25 @@
 """How well a reference tells the PSNR of an image, before there is an image.
 
 Symbols: x an image, t the truth, A and B the halves of a reference, all on clipped sRGB;
-e = x - t, a = A - t, b = B - t; v the variance of the mean of A and B in one pixel and channel, so
-that a and b have 2 v each; n pixels x channels of a frame; E = mean of e^2.
+e = x - t, a = A - t, b = B - t; P pixels of a frame; E = mean of e^2. Products with a dot are sums
+over the three channels of a pixel.
 
-The halves tell E as M = mean of (x - A)(x - B) = mean of e^2 - e (a + b) + a b. Given the image,
+The halves tell E as M = mean of (x - A)(x - B), so of e^2 - e (a + b) + a b. Given the image,
 
-    Var[M] = c/n^2 * sum (4 e^2 v + 4 v^2),
+    Var[M] = 1/(3 P)^2 * sum over pixels of (Var[e . a] + Var[e . b] + Var[a . b]),
 
-since a, b and pixels are independent. Channels are not: a path's light has much the same error in
-all three, so that c = 3, the most that is possible. What the image will be nobody knows yet: it is
-taken to be as good everywhere, e^2 = E = 1e-4, which is 40 dB. By the delta method the frame's
-PSNR then has the standard error 10 / ln 10 * sqrt(Var[M]) / E, and the mean over F frames the root
-of the sum of squares over F.
+since a, b and pixels are independent. (Channels are not: a path's light errs alike in all three.)
+Half of the difference of a half's two parts, q for A and r for B, has the second moments that a and
+b have, and q and r are independent. Hence, whatever the distribution of the noise and the
+correlation of channels, sums over pixels are estimated without bias by
 
-v is measured between the four parts, with 3 degrees of freedom: E[v^2 as measured] = 5/3 v^2. Of N
-samples a pixel it is 1/N at most, as of independent ones.
+    Var[e . a] ~ (e . q)^2,    Var[e . b] ~ (e . r)^2,    Var[a . b] ~ (q . r)^2.
+
+What the image will be nobody knows yet: it is taken to be as good everywhere, e^2 = E = 1e-4,
+which is 40 dB, and wrong alike in all channels. By the delta method the frame's PSNR then has the
+standard error 10 / ln 10 * sqrt(Var[M]) / E, and the mean over F frames the root of the sum of
+squares over F. With N samples a pixel q and r fall as 1/sqrt(N), or faster where samples are
+stratified.
 """
 
 from __future__ import annotations
@@ -31,9 +35,6 @@ from .srgb import srgb_from_linear
 MSE = 1e-4  # of a method of 40 dB
 FEWEST_SPP = 64  # below, what bends the halves on sRGB is no small correction any more
 MOST_SPP = 16384
-
-_CHANNELS = 3  # c above
-_FREEDOM = 3  # of v
 
 
 @dataclass(frozen=True)
@@ -62,12 +63,13 @@ class FrameNoise:
 
 def frame_noise(parts: np.ndarray, spp: int) -> FrameNoise:
     """What a reference's parts, (4, h, w, 3) linear radiance, say of their noise."""
-    shown = srgb_from_linear(parts)
-    v = shown.var(0, ddof=1, dtype=np.float64) / len(parts)
-    v = np.where(np.isfinite(v), v, 0.0)
-    scale = (10 / math.log(10) / MSE) ** 2 * _CHANNELS * 4 / v.size**2
-    return FrameNoise(spp, scale * MSE * float(v.sum()),
-                      scale * float(np.square(v).sum()) * _FREEDOM / (_FREEDOM + 2))
+    shown = srgb_from_linear(parts).astype(np.float64)
+    shown = np.where(np.isfinite(shown).all(0), shown, 0.0)
+    q, r = (shown[0] - shown[1]) / 2, (shown[2] - shown[3]) / 2
+    scale = (10 / math.log(10) / MSE / q.size) ** 2
+    crossed = np.square(q.sum(-1)).sum() + np.square(r.sum(-1)).sum()
+    squared = np.square((q * r).sum(-1)).sum()
+    return FrameNoise(spp, scale * MSE * float(crossed), scale * float(squared))
 
 
 def standard_error(noises: Iterable[FrameNoise]) -> float:

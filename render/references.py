@@ -36,7 +36,7 @@ from onespp.render.tracer.renderer import Renderer
 SECONDS_BETWEEN_SAVES = 10.0
 
 _PILOT_SPP = 16  # of one frame, by which the others are judged beforehand
-_TIMED_SPP = 2
+_TIMED_PATHS = 1 << 20  # or 64 samples
 
 _TOTALS = tuple(f"total{part}" for part in range(PARTS))
 _SAVED = {*_TOTALS, "samples", "antialias"}
@@ -143,11 +143,12 @@ class References:
         left = sum(max(0, n - self._samples(i)) for i, n in spp.items())
         if left == 0:
             return
+        height, width = self.sequence.size
+        timed = min(64, -(-_TIMED_PATHS // (height * width)))
         self.renderer.sample_sum(frames[0], self.seed, 0, 1, self.antialias)  # compiles
         start = time.perf_counter()
-        self.renderer.sample_sum(frames[0], self.seed, 0, _TIMED_SPP, self.antialias)
-        seconds = (time.perf_counter() - start) / _TIMED_SPP
-        height, width = self.sequence.size
+        self.renderer.sample_sum(frames[0], self.seed, 0, timed, self.antialias)
+        seconds = (time.perf_counter() - start) / timed
         fewest, most = min(spp.values()), max(spp.values())
         tell(f"references to {decibels:g} dB are likely to take "
              f"{fewest if fewest == most else f'{fewest} to {most}'} samples a pixel, so "

@@ -28,7 +28,7 @@ from onespp.render.progress import Progress, silent
 from .renderer import Renderer
 
 PARTS = 4
-SMALLEST_PASS, LARGEST_PASS = 4, 64  # samples; float32 sums inside a pass stay exact to ~1e-6
+SMALLEST_PASS, LARGEST_PASS = 16, 64  # samples; float32 sums inside a pass stay exact to ~1e-6
 MOST_PATHS = 1 << 24  # a pass; some seconds, after which it can be stopped
 MOST_SAMPLES = 1 << 24  # a pixel
 
@@ -87,7 +87,8 @@ def whole_spp(spp: int) -> int:
 def pass_end(done: int, pixels: int) -> int:
     """Samples that a part has after its next pass, for images of that many pixels.
 
-    4, 8, 16 ... up to the largest pass, and multiples of that.
+    16, 32 and 64, the largest pass, and multiples of that; where pixels are so many that fewer are
+    the largest pass, multiples of those.
     """
     largest = 1 << (max(1, min(LARGEST_PASS, MOST_PATHS // pixels)).bit_length() - 1)
     if done < largest:

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+import onespp.cli.run
 import onespp.render.job
 import onespp.render.tracer.reference
 from onespp.render.errors import InputError
@@ -55,7 +56,7 @@ def test_parts_get_equally_many_samples_in_turns(spp):
 @pytest.mark.parametrize("pixels", [1, 1920 * 1080, 3000 * 2000, MOST_PATHS + 1])
 def test_a_larger_reference_begins_with_the_passes_of_a_smaller_one(pixels):
     larger = passes_of(300, pixels)
-    for end in (4, 16, 64, 128):
+    for end in (16, 32, 64, 128):
         assert passes_of(end, pixels) == larger[:len(passes_of(end, pixels))]
     assert max(n * pixels for _, n in larger) <= max(MOST_PATHS, pixels)
     ends = [pass_end(done, pixels) for done in range(300)]
@@ -141,7 +142,7 @@ def test_an_interrupted_reference_goes_on_to_the_same_bytes(tmp_path, monkeypatc
     def interrupted(self, *arguments):
         nonlocal passes
         passes += 1
-        if passes == 12:  # in the middle of frame 1's reference
+        if passes == 7:  # in the middle of frame 1's reference
             raise KeyboardInterrupt
         return real(self, *arguments)
 
@@ -155,7 +156,7 @@ def test_an_interrupted_reference_goes_on_to_the_same_bytes(tmp_path, monkeypatc
 
     done = passes
     resumed = render_sequence(job, tmp_path / "stopped")
-    assert passes - done == PARTS * 2 - 3  # of frame 1's 8 passes, 3 were kept
+    assert passes - done == PARTS - 2  # of frame 1's 4 passes, 2 were kept
     for i in (0, 1):
         for kind in ("frames", "reference"):
             name = f"{kind}/{i:04d}.exr"
@@ -233,15 +234,23 @@ def test_a_better_reference_is_kept_and_said(tmp_path, call):
     assert FrameSequence.open(out).manifest.reference_spp == 24
 
 
-def test_the_default_of_run_keeps_a_better_reference_too(tmp_path, call):
+def test_the_default_of_run_is_an_error_and_keeps_a_better_reference_too(tmp_path, call,
+                                                                         monkeypatch):
+    monkeypatch.setattr(onespp.cli.run, "REFERENCE_ERROR", 1e3)
     out = tmp_path / "box"
     options = ("box", "--size", "12x9", "--frames", "0:2", "--out", out)
-    assert call("render", *options, "--reference-spp", 300)[0] == 0
+    assert call("render", *options[:3], "--frames", "0", "--out", out,
+                "--reference-spp", 300)[0] == 0
     before = files(out / "reference")
-    code, text, _ = call("run", *options, "--method", "bilateral")
-    assert (code, "kept 2 references of 300 spp" in text) == (0, True)
-    assert files(out / "reference") == before
-    assert json.loads((out / "scores.json").read_text())["reference_spp"] == 300
+    code, _, err = call("run", *options, "--method", "bilateral")
+    assert code == 0
+    assert "references to 1000 dB are likely to take 64 to 300 samples a pixel, so " in err
+    assert {p: t for p, t in files(out / "reference").items() if p in before} == before
+    sequence = FrameSequence.open(out)
+    assert [sequence.reference_spp(i) for i in (0, 1)] == [300, 64]
+    assert json.loads((out / "scores.json").read_text())["reference_spp"] == 64
+    code, _, err = call("run", *options, "--reference-spp", 16, "--reference-error", 1)
+    assert (code, err.count("\n"), "use one of them" in err) == (2, 1, True)
 
 
 def test_a_better_reference_through_another_filter_is_refused_and_kept(tmp_path, call):
