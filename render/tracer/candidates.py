@@ -33,8 +33,8 @@ FEWEST, MOST = 2, 8
 
 def candidates_for(scene: mi.Scene) -> int:
     """M for a scene: half its lights or more, a power of two, within bounds."""
-    half = (len(scene.emitters()) + 1) // 2
-    return min(max(FEWEST, 1 << (half - 1).bit_length()), MOST) if half > 0 else FEWEST
+    half = max(1, (len(scene.emitters()) + 1) // 2)
+    return min(max(FEWEST, 1 << (half - 1).bit_length()), MOST)
 
 
 @dr.syntax
