@@ -52,7 +52,8 @@ _ROWS = (
     Channel("unshadowed", _rgb("unshadowed"), False, 0.0,
             "direct light as if nothing cast a shadow, noise-free (`--direct resampled` only)"),
     Channel("visibility", ("visibility",), False, 0.0,
-            "share of `unshadowed` that arrives, one noisy sample, may exceed 1 (likewise)"),
+            "share of `unshadowed` that arrives, one noisy sample, may exceed 1, at most 10000 "
+            "(likewise)"),
     Channel("light", ("light.X", "light.Y", "light.Z"), False, 0.0,
             "from the first hit to the point of a light that its shadow ray asked for, world axes, "
             "scene units; 0: no ray (likewise)"),
