@@ -111,7 +111,8 @@ _ROWS = (
     Channel("unshadowed", Group.SPLIT, _rgb("unshadowed"), FLOAT, Display.LIGHT, 0.0,
             "direct light as if nothing cast a shadow, noise-free (`--direct resampled` only)"),
     Channel("visibility", Group.SPLIT, ("visibility",), FLOAT, Display.UNIT, 0.0,
-            "share of `unshadowed` that arrives, one noisy sample, may exceed 1 (likewise)"),
+            "share of `unshadowed` that arrives, one noisy sample, may exceed 1, at most 10000 "
+            "(likewise)"),
     Channel("light", Group.SHADOW, ("light.X", "light.Y", "light.Z"), FLOAT, Display.RANGE, 0.0,
             "from the first hit to the point of a light that its shadow ray asked for, world axes, "
             "scene units; 0: no ray (likewise)"),

@@ -1,9 +1,10 @@
-"""What materials say of themselves: the normal that they shade with, the width of their highlight.
+"""What materials say of themselves: the normal that they shade with, the width of their highlight,
+and the reflectance of what is diffuse in them.
 
-Mitsuba has no question for either from Python (the shading frame of a normal map is not exposed,
-and not passed on by `twosided`, `mask` and `blendbsdf`), so its tree of live BSDFs is walked. What
-each adapter does to the frame and to the directions of what it holds is written down here as its
-plugin does it (Mitsuba 3.9, `src/bsdfs`).
+Mitsuba has no question for the first two from Python (the shading frame of a normal map is not
+exposed, and not passed on by `twosided`, `mask` and `blendbsdf`), so its tree of live BSDFs is
+walked. What each adapter does to the frame and to the directions of what it holds is written down
+here as its plugin does it (Mitsuba 3.9, `src/bsdfs`).
 
 Symbols: n the local shading normal (0, 0, 1), n' the one that a map makes of it; h a bump map's
 height, d its scale; wi the local direction to the viewer; alpha the width of GGX.
@@ -25,6 +26,11 @@ plastic, 1 without a glossy lobe. For any other plugin it is taken from the dens
 lobe: along the normal that of the mirror direction is D / 4 = 1 / (4 pi alpha^2) for microfacets
 sampled by visible normals (Walter et al. 2007; exact for GGX and Beckmann, if nothing else is in
 the density).
+
+Of the diffuse reflectance Mitsuba knows only for some plugins what it is (`_TOLD`). Asked of any
+other, it takes what comes back along the normal, highlight included: 1 for a polarizing plastic, 12
+for a blend with metal. Here a blend has the mean of its parts, by weight, of which those that are
+not diffuse add nothing, and other plugins answer with their diffuse lobes alone.
 """
 
 from __future__ import annotations
@@ -40,6 +46,7 @@ from .variant import mi
 _MICROFACETS = ("RoughConductor", "RoughDielectric", "RoughPlastic", "PolarizedPlastic")
 _DISNEY = ("Principled", "PrincipledThin")
 _MAPS = ("NormalMap", "BumpMap")
+_TOLD = ("SmoothDiffuse", "SmoothPlastic", "RoughPlastic", *_DISNEY)
 _LEAST_DISNEY = 1e-3
 _NO_LENGTH = 1e-8  # squared; a texel (0.5, 0.5, 0.5) but for the rounding of its interpolation
 _MIRROR = +mi.BSDFFlags.DeltaReflection | +mi.BSDFFlags.DeltaTransmission
@@ -55,7 +62,8 @@ class Appearance:
     def __init__(self, bsdf_from_shape: Mapping[int, mi.BSDF]) -> None:
         size = max(bsdf_from_shape) + 1
         alphas, self._varying, self._mapped = np.ones(size, np.float32), [], []
-        rows = np.zeros((2, size), np.uint32)  # which of the lists' entries, from 1; 0: none
+        self._untold: list[mi.BSDF] = []
+        rows = np.zeros((3, size), np.uint32)  # which of the lists' entries, from 1; 0: none
         nothing = dr.zeros(mi.SurfaceInteraction3f)
         for index, bsdf in bsdf_from_shape.items():
             if _varies(bsdf):
@@ -67,7 +75,10 @@ class Appearance:
             if _is_mapped(bsdf):
                 self._mapped.append(bsdf)
                 rows[1, index] = len(self._mapped)
-        self._alphas = mi.Float(alphas)
+            if not _is_told(bsdf):
+                self._untold.append(bsdf)
+                rows[2, index] = len(self._untold)
+        self._alphas, self._untold_row = mi.Float(alphas), mi.UInt32(rows[2])
         self._varying_row, self._mapped_row = mi.UInt32(rows[0]), mi.UInt32(rows[1])
 
     def roughness(self, si: mi.SurfaceInteraction3f) -> mi.Float:
@@ -98,6 +109,59 @@ class Appearance:
                 mapped = dr.select(dr.dot(mapped, smooth) < 0, -mapped, mapped)
                 n = dr.select(here, mapped, n)
         return dr.select(valid, n, 0)
+
+    def albedo(self, si: mi.SurfaceInteraction3f) -> mi.Color3f:
+        """Diffuse reflectance, 1 where there is no diffuse lobe, 0 where there is no surface."""
+        valid, bsdf = si.is_valid(), si.bsdf()
+        diffuse = mi.has_flag(bsdf.flags(), mi.BSDFFlags.DiffuseReflection)
+        value = dr.select(diffuse, mi.Color3f(bsdf.eval_diffuse_reflectance(si, valid)), 1)
+        if self._untold:
+            shape = mi.UInt32(dr.reinterpret_array(mi.UInt32, si.shape))
+            row = dr.gather(mi.UInt32, self._untold_row, shape, valid)
+            for number, one in enumerate(self._untold, 1):
+                here = valid & (row == number)
+                found, share = _diffuse(one, si, here)
+                value = dr.select(here, dr.select(share > 0, found, 1), value)
+        return dr.select(valid, dr.clip(value, 0, 1), 0)
+
+
+def _diffuse(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f,
+             active: mi.Bool) -> tuple[mi.Color3f, mi.Float]:
+    """Diffuse reflectance of one material, and the share of it, by weight, that is diffuse."""
+    kind, parts = bsdf.class_name(), _objects(bsdf)
+    if kind == "TwoSidedBRDF":
+        front, back = (_diffuse(side, si, active) for side in _sides(parts))
+        behind = si.wi.z < 0
+        return dr.select(behind, back[0], front[0]), dr.select(behind, back[1], front[1])
+    if kind in ("MaskBSDF", *_MAPS):
+        return _diffuse(parts["nested_bsdf"], si, active)
+    if kind == "BlendBSDF":
+        weight = dr.clip(parts["weight"].eval_1(si, active), 0, 1)
+        (a, of_a), (b, of_b) = (_diffuse(parts[name], si, active) for name in ("bsdf_0", "bsdf_1"))
+        return a * (1 - weight) + b * weight, of_a * (1 - weight) + of_b * weight
+    if not bsdf.flags() & +mi.BSDFFlags.DiffuseReflection:
+        return mi.Color3f(0), mi.Float(0)
+    if kind in _TOLD:
+        return mi.Color3f(bsdf.eval_diffuse_reflectance(si, active)), mi.Float(1)
+    if "diffuse_reflectance" in parts:
+        return mi.Color3f(parts["diffuse_reflectance"].eval(si, active)), mi.Float(1)
+    along = mi.Vector3f(0, 0, 1)
+    facing = mi.SurfaceInteraction3f(si)
+    facing.wi = along
+    context = mi.BSDFContext()
+    context.type_mask = mi.BSDFFlags.Diffuse
+    return mi.Color3f(bsdf.eval(context, facing, along, active)) * dr.pi, mi.Float(1)
+
+
+def _is_told(bsdf: mi.BSDF) -> bool:
+    """Whether Mitsuba knows the diffuse reflectance of a material, or it has none."""
+    kind = bsdf.class_name()
+    if kind == "TwoSidedBRDF":  # one value for both sides, unless one is not diffuse
+        lobes = {bool(side.flags() & +mi.BSDFFlags.DiffuseReflection) for side in _nested(bsdf)}
+        return len(lobes) == 1 and all(map(_is_told, _nested(bsdf)))
+    if kind in ("MaskBSDF", *_MAPS):
+        return all(map(_is_told, _nested(bsdf)))
+    return kind in _TOLD or not bsdf.flags() & +mi.BSDFFlags.DiffuseReflection
 
 
 def _alpha(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f, active: mi.Bool) -> mi.Float:

@@ -24,15 +24,8 @@ class PrimaryHit:
 
 
 def albedo(hit: PrimaryHit) -> mi.Color3f:
-    """Diffuse reflectance, 1 where there is no diffuse lobe.
-
-    Mitsuba reports 0 for smooth conductors and an extrapolated highlight for rough ones; neither
-    can be divided by.
-    """
-    bsdf = hit.si.bsdf()
-    diffuse = mi.has_flag(bsdf.flags(), mi.BSDFFlags.DiffuseReflection)
-    reflectance = dr.clip(bsdf.eval_diffuse_reflectance(hit.si), 0, 1)
-    return dr.select(hit.si.is_valid(), dr.select(diffuse, reflectance, 1), 0)
+    """Diffuse reflectance, 1 where there is no diffuse lobe: a divisor of light."""
+    return hit.stage.appearance.albedo(hit.si)
 
 
 def normal(hit: PrimaryHit) -> mi.Vector3f:

@@ -24,6 +24,8 @@ from .candidates import sought_light
 from .lights import DirectLight, power_heuristic, resample_lights, shape_index
 from .sampler import Sampler, Sobol
 
+LARGEST_VISIBILITY = 1e4  # picks of 16 lights give up to 2560, by what lights.py lets a pick weigh
+
 
 @dataclass
 class Radiance:
@@ -187,5 +189,7 @@ def _with_split(radiance: Radiance, arrived: mi.Color3f, split: DirectLight | No
     if split is not None:
         possible = mi.luminance(split.unshadowed)
         radiance.unshadowed, radiance.shadow_ray = split.unshadowed, split
-        radiance.visibility = dr.select(possible > 0, mi.luminance(arrived) / possible, 0)
+        # Where U underflows (rough glass seen from inside) the ratio says nothing; D has it all.
+        radiance.visibility = dr.select(possible > 0, dr.minimum(
+            mi.luminance(arrived) / possible, LARGEST_VISIBILITY), 0)
     return radiance

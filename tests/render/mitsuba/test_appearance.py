@@ -249,3 +249,41 @@ def test_roughness_is_that_of_the_side_that_is_seen():
     for degrees, alpha in ((0, 1.0), (180, 0.3)):
         _, frame, here = seen(sides, place=rotate((0, 1, 0), degrees))
         np.testing.assert_allclose(frame["roughness"][here], alpha, atol=1e-6)
+
+
+CHALK = {"type": "diffuse", "reflectance": (0.2, 0.3, 0.4)}
+PAINT = {"diffuse_reflectance": (0.2, 0.3, 0.4)}
+ALBEDOS = {
+    "chalk": (CHALK, 1.0),
+    "polarizing plastic": ({"type": "pplastic", "alpha": 0.1, **PAINT}, 1.0),
+    "plastic": (twosided(plastic(0.1, **PAINT)), 1.0),
+    "blend with metal": (blend(CHALK, conductor(0.1), 0.25), 0.75),
+    "blend with a mirror": (blend(MIRROR, CHALK, 0.25), 0.25),
+    "blend with plastic": (twosided(blend(CHALK, plastic(0.1, **PAINT))), 1.0),
+    "bumpy blend": (wavy(blend(CHALK, conductor(0.1), 0.5)), 0.5),
+    "mask of a blend": (masked(blend(CHALK, conductor(0.1), 0.5)), 0.5),
+    "chalk before metal": ({"type": "twosided", "a": CHALK, "b": conductor(0.1)}, 1.0),
+}
+
+
+@pytest.mark.parametrize("name", ALBEDOS)
+def test_albedo_is_of_what_is_diffuse_alone(name):
+    """Seen along the normal, where a highlight would be brightest."""
+    material, share = ALBEDOS[name]
+    _, frame, here = seen(material, eye=(0.01, 0.01, 3))
+    expected = np.tile(np.array((0.2, 0.3, 0.4)) * share, (here.sum(), 1))
+    np.testing.assert_allclose(frame["albedo"][here], expected, atol=2e-3)
+
+
+@pytest.mark.parametrize("material", [
+    conductor(0.1), MIRROR, glass(), blend(CHALK, conductor(0.1), 1.0),
+    blend(MIRROR, conductor(0.1))])
+def test_albedo_is_one_where_nothing_is_diffuse(material):
+    _, frame, here = seen(material)
+    assert (frame["albedo"][here] == 1).all()
+
+
+def test_albedo_is_that_of_the_side_that_is_seen():
+    sides = {"type": "twosided", "a_front": CHALK, "b_back": conductor(0.1)}
+    _, frame, here = seen(sides, place=rotate((0, 1, 0), 180))
+    assert (frame["albedo"][here] == 1).all()

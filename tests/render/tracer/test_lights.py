@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from onespp.render.channels import FRAME, SPLIT
 from onespp.render.errors import InputError
+from onespp.render.mitsuba.variant import mi
+from onespp.render.tracer.path import LARGEST_VISIBILITY, Radiance, _with_split
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
@@ -75,3 +80,14 @@ def test_unknown_options_are_refused():
 def test_the_plain_estimator_has_no_split():
     with pytest.raises(InputError, match="resampled"):
         Renderer(small_scene(), 4, 4).frame(0, channels=(*FRAME, *SPLIT))
+
+
+def test_visibility_is_bounded_where_unshadowed_light_underflows():
+    """As on rough glass seen from inside: it was 1e18, which a half is too small for."""
+    nothing = mi.Color3f(0)
+    tiny = mi.Color3f(mi.Float([1e-30, 0.0, 2.0]))
+    split: Any = SimpleNamespace(unshadowed=tiny)
+    radiance = Radiance(nothing, nothing, nothing, nothing, mi.Float(0), mi.UInt32(0))
+    found = _with_split(radiance, mi.Color3f(3.0), split)
+    assert found.visibility is not None
+    np.testing.assert_allclose(found.visibility.numpy(), [LARGEST_VISIBILITY, 0, 1.5], rtol=1e-6)
