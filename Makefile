@@ -29,8 +29,8 @@ docs: .venv/installed-docs
 	$(BIN)/python -m sphinx -E -W --keep-going -q -b html docs build/docs
 	@echo "Look at build/docs/index.html."
 
-# All tables of README.md and docs/results.md. It renders references first, which takes hours, and
-# resumes. `make results ARGS=--write` writes the tables into the two files.
+# All tables of README.md and docs/results.md: an hour on two cores, most of it references; it resumes.
+# `make results ARGS=--write` writes the tables into the two files.
 results: .venv/installed-dev
 	$(BIN)/python docs/results.py $(ARGS)
 

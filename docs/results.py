@@ -1,12 +1,13 @@
 """Prints the tables of README.md and docs/results.md, or writes them there (`--write`).
 
-    python docs/results.py                         # hours: the references
+    python docs/results.py                         # an hour on two cores
     python docs/results.py --frames 0:2 --box-size 48x48 --room-size 48x27 --reference-spp 16 \\
         --parts scores --data build/tiny           # a minute, to see that it works
 
 Each part is a block `<!-- results:NAME -->` ... `<!-- /results -->` in one of the two files. A part
 renders what it needs, denoises and scores it by the library, and says what its numbers stand on:
-frames, size, samples of the reference and its noise floor, seed, tone map, the input's own score.
+frames, size, samples of the reference, seed, tone map, the input's own score. What is quadratic is
+by halves of the reference, and has no floor but a standard error (±).
 
 It can be stopped and started again: renders and references resume, results of the same parameters
 are kept. After a change of a method, `--again` denoises anew.
@@ -218,8 +219,13 @@ def scores_of(sequence: FrameSequence) -> Scores:
 # The tables: each part makes the text of its block.
 
 def number(score: MethodScore | None, measure: str, form: str) -> str:
+    """With its standard error, if that shows; `≥` marks a bound."""
     value = score[measure] if score else None
-    return "" if value is None else format(value, form)
+    if score is None or value is None:
+        return ""
+    text = ("≥ " if measure in score.bounds else "") + format(value, form)
+    error = format(score.errors.get(measure, 0.0), form)
+    return f"{text} ±{error}" if float(error) else text
 
 
 def milliseconds(score: MethodScore | None) -> str:
@@ -247,11 +253,10 @@ def frames_text(frames: list[int]) -> str:
 
 def conditions(scores: Scores) -> str:
     """What numbers of a sequence stand on, with the score of its own input."""
-    floor = scores.reference_floor_db
-    noisy = scores.methods[INPUT]["psnr_srgb"]
+    noisy, flip = scores.methods[INPUT]["psnr_srgb"], scores.flip_floor
     return (f"`{scores.scene}`: frames {frames_text(scores.frames)} at {scores.size[0]}x"
-            f"{scores.size[1]}, reference {scores.reference_spp} spp (noise floor "
-            + (f"{floor:.1f} dB" if floor is not None else "not known")
+            f"{scores.size[1]}, reference {scores.reference_spp} spp in halves ("
+            + (f"floor of FLIP {flip:.3f}" if flip is not None else "floor of FLIP not known")
             + f"), seed {scores.seed}, input "
             + (f"{noisy:.2f} dB" if noisy is not None else "without a score"))
 
@@ -358,11 +363,9 @@ def hard(plan: Plan) -> str:
 
 
 def _hard_conditions(plan: Plan) -> str:
-    floors = [row.floor for row in plan.hard_rows]
     scene = HARD[plan.hard[0]].make()
     return (f"{len(plan.hard)} scenes, {scene.frames} frames of {scene.width}x{scene.height}, "
-            f"references {plan.hard_spp} spp (noise floors {min(floors):.1f} to "
-            f"{max(floors):.1f} dB), seed 0, PSNR on {TONE_MAP}.")
+            f"references {plan.hard_spp} spp in halves, seed 0, PSNR on {TONE_MAP}.")
 
 
 PARTS: dict[str, tuple[Path, Callable[[Plan], str]]] = {
@@ -409,11 +412,11 @@ def own_command(name: str, plan: Plan) -> str:
               help="Frames of box and room.")
 @click.option("--box-size", default="256x256", show_default=True, metavar="WxH")
 @click.option("--room-size", default="320x180", show_default=True, metavar="WxH")
-@click.option("--reference-spp", default=1024, show_default=True, metavar="N",
+@click.option("--reference-spp", default=256, show_default=True, metavar="N",
               help="Of box and room.")
-@click.option("--others-spp", default=256, show_default=True, metavar="N",
+@click.option("--others-spp", default=128, show_default=True, metavar="N",
               help="Of the scenes that nothing was tuned on.")
-@click.option("--hard-spp", default=256, show_default=True, metavar="N",
+@click.option("--hard-spp", default=128, show_default=True, metavar="N",
               help="Of the hard scenes.")
 @click.option("--seed", default=0, show_default=True, metavar="N", help="Of box and room.")
 @click.option("--hard", "hard_names", multiple=True, metavar="NAME", type=click.Choice([*HARD]),

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from onespp.denoise.catalog import METHODS, Method
-from onespp.denoise.metrics.image import non_finite, pair
-from onespp.denoise.metrics.noise_floor import reference_floor
-from onespp.denoise.metrics.table import measure_pair
+from onespp.denoise.metrics.errors import psnr
+from onespp.denoise.metrics.estimate import number
+from onespp.denoise.metrics.image import Pair, Target, display_error, non_finite, pair
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.frame import Frame
@@ -35,7 +35,6 @@ class Row:
         energy: mean of its output over mean of the reference, all frames together.
         bad_pixels: non-finite ones, all frames together.
         diffuse: whether the scene has nothing but diffuse surfaces.
-        floor: dB that a perfect image would get against this noisy reference.
     """
 
     scene: str
@@ -46,7 +45,6 @@ class Row:
     energy: float
     bad_pixels: int
     diffuse: bool
-    floor: float
 
     @property
     def gain(self) -> float:
@@ -85,16 +83,15 @@ def judge(folder: FrameSequence, scene: str, event: int | None, diffuse: bool,
         raise InputError(f"{folder.folder} lacks frame or reference {missing[0]}: render them with "
                          "--reference-spp")
     frames = [folder.read_frame(i) for i in folder.frames]
-    truth = [folder.read_reference(i) for i in folder.frames]
-    colors = [t.color for t in truth]
-    floor = float(np.mean([reference_floor(t.color, t.variance) for t in truth]))
+    truth = [Target(t.color, t.parts) for t in map(folder.read_reference, folder.frames)]
     rows = []
     for done, name in enumerate((INPUT, *METHODS), 1):
         images, alone = _denoised(name, frames)
-        psnr, yardstick = _decibels(images, colors), _decibels(alone, colors)
-        energy = float(np.mean(images, dtype=np.float64) / np.mean(colors, dtype=np.float64))
+        psnr, yardstick = _decibels(images, truth), _decibels(alone, truth)
+        energy = float(np.mean(images, dtype=np.float64)
+                       / np.mean([t.linear for t in truth], dtype=np.float64))
         bad = sum(int(non_finite(image).sum()) for image in images)
-        rows.append(Row(scene, name, psnr, yardstick, event, energy, bad, diffuse, floor))
+        rows.append(Row(scene, name, psnr, yardstick, event, energy, bad, diffuse))
         progress(done, len(METHODS) + 1, f"judge {scene}")
     return rows
 
@@ -123,9 +120,14 @@ def run_alone(method: Method, frames: Iterable[Frame], state: object) -> list[np
     return [method(frame, state)[0] for frame in frames]
 
 
-def _decibels(images: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> tuple[float, ...]:
-    values = (measure_pair(pair(a, b), ("psnr_srgb",))["psnr_srgb"] for a, b in zip(images, truth))
-    return tuple(float(value) for value in values if value is not None)
+def _decibels(images: Sequence[np.ndarray], truth: Sequence[Target]) -> tuple[float, ...]:
+    return tuple(_psnr(pair(image, target)) for image, target in zip(images, truth))
+
+
+def _psnr(images: Pair) -> float:
+    """By halves of the reference where it has them; a bound where these cannot tell it from 0."""
+    estimate = None if images.same else display_error(images)
+    return psnr(*images.srgb) if estimate is None else number("dB", [estimate]).value
 
 
 def misses(rows: Iterable[Row]) -> dict[str, list[str]]:
@@ -133,7 +135,7 @@ def misses(rows: Iterable[Row]) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for row in rows:
         off = row.diffuse and row.method != INPUT and abs(row.energy - 1) > ENERGY_MARGIN
-        for broken, promise, number in (
+        for broken, promise, figure in (
                 (row.bad_pixels, "pixels that are not finite", f"{row.bad_pixels}"),
                 (row.gain < -MARGIN, f"more than {MARGIN} dB worse than its history-free form",
                  f"{row.gain:+.1f}"),
@@ -142,7 +144,7 @@ def misses(rows: Iterable[Row]) -> dict[str, list[str]]:
                 (off, f"energy off by more than {ENERGY_MARGIN:.0%} where all is diffuse"
                  .replace("%", " %"), f"{row.energy:.3f}")):
             if broken:
-                found.setdefault(f"{row.method}: {promise}", []).append(f"{row.scene} ({number})")
+                found.setdefault(f"{row.method}: {promise}", []).append(f"{row.scene} ({figure})")
     return found
 
 

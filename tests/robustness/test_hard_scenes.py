@@ -246,8 +246,7 @@ def test_float32_reprojection_finds_the_place_that_float64_finds(name):
 
 
 def test_rows_say_what_history_costs_and_when_it_is_made_good():
-    row = Row("cut", "m", (30, 30, 25, 27, 29.8, 30), (29, 29, 28, 28, 30, 30), 2, 0.95, 0, True,
-              50)
+    row = Row("cut", "m", (30, 30, 25, 27, 29.8, 30), (29, 29, 28, 28, 30, 30), 2, 0.95, 0, True)
     assert row.gain == pytest.approx(np.mean([1, 1, -3, -1, -0.2, 0]))
     assert row.worst == -3
     assert row.recovery == 2
