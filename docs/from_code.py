@@ -170,7 +170,8 @@ def metrics() -> str:
     return table(
         ("measure", "key", "unit", "better", "takes", "definition"),
         ((m.label, f"`{m.name}`", m.unit, "higher" if m.higher_is_better else "lower",
-          {"linear": "linear radiance", "srgb": "display values", "step": "two frames"}[m.space],
+          {"linear": "linear radiance", "srgb": "display values", "step": "two frames",
+           "flip": "linear radiance" if m.name == "flip_hdr" else "display values"}[m.space],
           m.about) for m in MEASURES.values()))
 
 

@@ -29,7 +29,7 @@ products have the covariance E[L_1 L_1' + L_2 L_2' - Q Q'].
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +37,7 @@ import numpy as np
 from .estimate import Estimate
 from .tonemap import srgb_from_linear
 
+_STRIP = 32  # rows
 BLOCK = 8
 """Side of a block in pixels: a sampler may make neighbours depend on each other."""
 
@@ -95,10 +96,19 @@ def mean_product(image: np.ndarray, halves: Halves,
     count = image.size if where is None else image.shape[2] * int(where.sum())
     if not count:
         return None
-    planes = products(image, halves)
-    if where is not None:
-        planes = [np.where(where[..., None], plane, 0) for plane in planes]
-    value, *noise = (block_sums(plane) / count for plane in planes)
+    def planes(rows: slice) -> list[np.ndarray]:
+        found = products(image[rows], halves.apply(lambda part: part[rows]))
+        return found if where is None else [plane * where[rows, :, None] for plane in found]
+
+    return _estimate(planes, image.shape[0], count)
+
+
+def _estimate(planes: Callable[[slice], Sequence[np.ndarray]], height: int,
+              count: int) -> Estimate:
+    """Of the value, L_1, L_2 and Q of the pixels of some rows; by strips that fit into a cache."""
+    sums = [[block_sums(plane) for plane in planes(slice(top, top + _STRIP))]
+            for top in range(0, height, _STRIP)]
+    value, *noise = (np.concatenate(part) / count for part in zip(*sums))
     return Estimate.of_blocks(float(value.sum()), np.stack(noise))
 
 
@@ -121,7 +131,6 @@ class RelativeError:
         self._mean = parts.mean(axis=0)
         self._halves = linear_halves(parts)
         self._weight = whole = 1 / (self._mean ** 2 + floor)
-        self._weighted_noise = whole * self._halves.noise_a, whole * self._halves.noise_b
         off = parts - self._mean
         left, right = (off[0] + off[1]) / 2, (off[2] + off[3]) / 2
         self._powers = [2 * whole * left * right, 0 * self._mean, 2 * whole]
@@ -133,13 +142,16 @@ class RelativeError:
 
     def of(self, image: np.ndarray) -> Estimate:
         """The estimate for an image of radiance."""
-        y, (constant, slope, curve) = image - self._mean, self._powers
-        h, noise = self._halves, self._weighted_noise
-        factor = 1 + self._mean * self._weight * y  # what the weight's own noise adds
-        sums = [block_sums(plane) / image.size for plane in (
-            (curve * y + slope) * y + constant, (image - h.a) * noise[1] * factor,
-            (image - h.b) * noise[0] * factor, h.noise_a * noise[1])]
-        return Estimate.of_blocks(float(sums[0].sum()), np.stack(sums[1:]))
+        def planes(rows: slice) -> Sequence[np.ndarray]:
+            x, mean, weight = image[rows], self._mean[rows], self._weight[rows]
+            constant, slope, curve = (power[rows] for power in self._powers)
+            h = self._halves.apply(lambda part: part[rows])
+            y = x - mean
+            factor = weight * (1 + mean * weight * y)  # and what the weight's own noise adds
+            return ((curve * y + slope) * y + constant, (x - h.a) * h.noise_b * factor,
+                    (x - h.b) * h.noise_a * factor, h.noise_a * h.noise_b * weight)
+
+        return _estimate(planes, image.shape[0], image.size)
 
 
 def mean_difference(image: np.ndarray, halves: Halves) -> Estimate | None:
@@ -160,6 +172,9 @@ def mean_difference(image: np.ndarray, halves: Halves) -> Estimate | None:
 def block_sums(plane: np.ndarray) -> np.ndarray:
     """(n,) float64 sums of an (h, w, c) image over blocks of `BLOCK` x `BLOCK` pixels."""
     h, w, c = plane.shape
+    if h % BLOCK == w % BLOCK == 0:  # the same, faster
+        rows = plane.reshape(h // BLOCK, BLOCK, w * c).sum(axis=1)
+        return rows.reshape(-1, BLOCK * c).sum(axis=1, dtype=np.float64)
     rows = np.add.reduceat(plane.reshape(h, w * c), np.arange(0, h, BLOCK), axis=0)
     return np.add.reduceat(rows, np.arange(0, w * c, BLOCK * c), axis=1, dtype=np.float64).ravel()
 

