@@ -55,7 +55,7 @@ def bench_reference(scenes: tuple[str, ...], pixels: int, spp: int, repeats: int
     from onespp.render.study.efficiency import measure, size_of
     from onespp.scenes import catalog
 
-    every = (*catalog.SCENES, *getattr(catalog, "GENERATED", ()))
+    every = (*catalog.SCENES, *catalog.GENERATED)
     loaded = [catalog.load(name) for name in scenes or every]
     sizes = [size_of(scene, pixels) for scene in loaded]
     for height, width in sizes:
