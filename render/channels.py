@@ -40,6 +40,8 @@ def _rgb(layer: str) -> tuple[str, ...]:
     return tuple(f"{layer}.{c}" for c in "RGB")
 
 
+MOST_GROUPS = 4  # of lights, each with a visibility of its own
+
 _ROWS = (
     Channel("color", ("R", "G", "B"), False, 0.0,
             "radiance, linear Rec. 709; emission + direct + indirect (+ the environment)"),
@@ -62,6 +64,15 @@ _ROWS = (
             "from the first hit to what stopped that ray, scene units; 0: nothing did (likewise)"),
     Channel("blocker_id", ("blocker.ID",), False, -1.0,
             "object ID of what stopped it; -1: nothing (likewise)"),
+    Channel("group", ("group.ID",), False, -1.0,
+            "group of lights that the shadow ray went to; -1: no ray (with --direct resampled and "
+            "two lights or more)"),
+    Channel("group_sample", ("group.V", "group.W", "group.P"), False, 0.0,
+            "what that ray says of its group: visibility sample y, its weight (the mean of y were "
+            "nothing in the way), and the chance that the ray had to go there (likewise)"),
+    *(Channel(f"unshadowed{g}", _rgb(f"unshadowed{g}"), False, 0.0,
+              f"part of `unshadowed` that light sampling finds in group {g} (likewise)")
+      for g in range(MOST_GROUPS)),
     Channel("specular", _rgb("specular"), False, 0.0,
             "part of `indirect` whose first direction a glossy or mirror lobe chose"),
     Channel("hit_distance", ("hit.Z",), False, 0.0,
@@ -95,9 +106,11 @@ CHANNELS = MappingProxyType({row.name: row for row in _ROWS})
 RADIANCE = ("color", "emission", "direct", "indirect")
 SPLIT = ("unshadowed", "visibility")
 SHADOW = ("light", "light_id", "blocker_distance", "blocker_id")
+UNSHADOWED = tuple(f"unshadowed{g}" for g in range(MOST_GROUPS))
+GROUPED = ("group", "group_sample", *UNSHADOWED)
 GLOSS = ("specular", "hit_distance", "hit_id", "roughness")
 REPLAY = ("replay", "replay_before")
 GBUFFER = ("albedo", "normal", "position", "depth", "id")
 FRAME = RADIANCE + GBUFFER
 REFERENCE = ("color", "variance")
-IDS = ("id", "light_id", "blocker_id", "hit_id")  # of objects
+IDS = ("id", "light_id", "blocker_id", "hit_id", "group")  # of objects, and of groups of lights

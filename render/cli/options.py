@@ -6,7 +6,7 @@ import os
 
 import click
 
-from onespp.render.channels import FRAME, GLOSS, REPLAY, SHADOW, SPLIT
+from onespp.render.channels import FRAME, GLOSS, GROUPED, REPLAY, SHADOW, SPLIT
 from onespp.render.host import backend
 
 
@@ -27,7 +27,7 @@ overwrite_option = click.option(
     "--overwrite/--resume", default=False,
     help="Replace another sequence in the folder, or go on with the same one where it stopped; "
          "default resume.")
-OFFERED = (*FRAME, *SPLIT, *SHADOW, *GLOSS, *REPLAY)
+OFFERED = (*FRAME, *SPLIT, *SHADOW, *GROUPED, *GLOSS, *REPLAY)
 
 
 def render_options(command):

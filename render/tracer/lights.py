@@ -19,6 +19,16 @@ The weights are those of plain light sampling: any weights do that add up to 1, 
 lights that touch the surface. The uniform part DELTA reaches lights whose midpoints all lie below
 the horizon.
 
+Where several lights meet, V is noise of which of them was picked. So lights are in groups g
+(`light_groups.py`) with a visibility each. P_g is the sum of p_k over the strata of g, w_k the
+weight of k's midpoint. The ray, if it went to g, tells
+
+    y = v l(w c) P_g / (p_k l(U_g)),   omega = l(w_k c_k) P_g / (p_k l(U_g)),   U_g = sum w_k c_k.
+
+Over the picks in g, omega has the mean 1 and y that of V_g, the share of U_g that arrives: the sum
+of y over that of omega, over pixels that saw the same lights, is V_g without noise of choice. What
+the BSDF's sample runs into is in no group.
+
 Source: resampled importance sampling (Talbot et al. 2005) with the ratio estimator of Heitz et al.
 2018 ("Combining analytic direct illumination and stochastic shadows"), U by midpoints.
 """
@@ -35,6 +45,31 @@ from .sampler import Sampler
 
 GRID = 4
 DELTA = 0.1
+_DIMMEST = 1e-6  # share of l(U): a group that gives less has no visibility
+
+
+@dataclass
+class LightGroups:
+    """Which group each emitter is in, in the order of `scene.emitters()`; sizes: emitters in each.
+    """
+
+    of_emitter: mi.UInt32
+    sizes: tuple[int, ...]
+
+
+@dataclass
+class GroupSample:
+    """What the shadow ray says of the group of lights that it went to (see the module's header).
+
+    unshadowed: U_g of every group. group: g, -1 if no ray was sent. visibility: y. weight: omega.
+    chance: P_g.
+    """
+
+    unshadowed: list[mi.Color3f]
+    group: mi.Int32
+    visibility: mi.Float
+    weight: mi.Float
+    chance: mi.Float
 
 
 @dataclass
@@ -43,7 +78,7 @@ class DirectLight:
 
     light: from the surface to the light's point, 0 where no ray was sent. blocker_distance: from
     the surface to what stopped the ray, 0 if nothing did. light_shape, blocker_shape: index in the
-    JIT registry, 0 for none.
+    JIT registry, 0 for none. groups: None where all lights are one.
     """
 
     direct: mi.Color3f
@@ -52,11 +87,12 @@ class DirectLight:
     light_shape: mi.UInt32
     blocker_distance: mi.Float
     blocker_shape: mi.UInt32
+    groups: GroupSample | None = None
 
 
 @dr.syntax
 def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
-                    active: mi.Bool) -> DirectLight:
+                    active: mi.Bool, groups: LightGroups | None = None) -> DirectLight:
     """Direct light toward `si.wi` from light sampling, one shadow ray a lane."""
     emitters = len(scene.emitters())
     strata = GRID * GRID * emitters
@@ -66,9 +102,11 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     left = mi.Float(choice)
     unshadowed, total = mi.Color3f(0), mi.Float(0)
     picked, picked_luminance = mi.UInt32(0), mi.Float(0)
+    by_group, luminances = no_light(groups), no_light(groups)
+    picked_weighted = mi.Float(0)
     k = mi.UInt32(0)
     while dr.hint(k < strata, max_iterations=strata, label="lights"):
-        c, _ = contribution(scene, si, k, mi.Point2f(0.5), active)
+        c, light = contribution(scene, si, k, mi.Point2f(0.5), active)
         luminance = mi.luminance(c)
         unshadowed += c
         total += luminance
@@ -76,6 +114,12 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
         taken = left < share
         picked = dr.select(taken, k, picked)
         picked_luminance = dr.select(taken, luminance, picked_luminance)
+        if dr.hint(groups is not None, mode="scalar"):
+            weighted = weight(si, light, emitters, active) * c
+            picked_weighted = dr.select(taken, mi.luminance(weighted), picked_weighted)
+            group = dr.gather(mi.UInt32, groups.of_emitter, k // (GRID * GRID), active)
+            by_group = added(by_group, group, weighted)
+            luminances = added(luminances, group, mi.Color3f(luminance))
         # What is left of the random number is uniform again.
         left = dr.select(taken, left / share, (left - share) / dr.maximum(1 - share, 1e-9))
         left = dr.clip(left, 0, 1 - 2.0**-24)
@@ -85,8 +129,8 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     uniform = dark | (left < DELTA)
     anywhere = dr.select(dark, choice, left / DELTA)
     picked = dr.select(uniform, dr.minimum(mi.UInt32(anywhere * strata), strata - 1), picked)
-    midpoint, _ = contribution(scene, si, picked, mi.Point2f(0.5), active & uniform)
-    picked_luminance = dr.select(uniform, mi.luminance(midpoint), picked_luminance)
+    middle, middle_light = contribution(scene, si, picked, mi.Point2f(0.5), active & uniform)
+    picked_luminance = dr.select(uniform, mi.luminance(middle), picked_luminance)
     p = dr.select(dark, 1, (1 - DELTA) * strata * picked_luminance / total + DELTA) / strata
 
     c, light = contribution(scene, si, picked, jitter, active)
@@ -94,12 +138,46 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     toward = si.spawn_ray_to(light.p)
     blocker = scene.ray_intersect_preliminary(toward, coherent=False, active=lit)
     shadowed = blocker.is_valid()
-    bsdf_pdf = si.bsdf().pdf(mi.BSDFContext(), si, si.to_local(light.d), lit)
-    w = dr.select(light.delta, 1, power_heuristic(light.pdf / emitters, bsdf_pdf))
+    w = weight(si, light, emitters, lit)
+    direct = dr.select(lit & ~shadowed, w * c / p, 0)
+    sample = None
+    if dr.hint(groups is not None, mode="scalar"):
+        middle_weighted = weight(si, middle_light, emitters, active & uniform) * middle
+        picked_weighted = dr.select(uniform, mi.luminance(middle_weighted), picked_weighted)
+        group = dr.gather(mi.UInt32, groups.of_emitter, picked // (GRID * GRID), active)
+        even = dr.select(dark, 1, DELTA)
+        chance = mi.Float(0)
+        for g, size in enumerate(groups.sizes):
+            share = dr.select(dark, 0, (1 - DELTA) * luminances[g].x / total)
+            chance = dr.select(group == g, share + even * (size / emitters), chance)
+        sample = group_sample(by_group, group, chance, mi.luminance(direct), picked_weighted / p,
+                              active, total)
     return DirectLight(
-        dr.select(lit & ~shadowed, w * c / p, 0), unshadowed,
+        direct, unshadowed,
         dr.select(lit, light.p - si.p, 0), shape_index(light.emitter.get_shape(), lit),
-        dr.select(lit & shadowed, blocker.t, 0), shape_index(blocker.shape, lit & shadowed))
+        dr.select(lit & shadowed, blocker.t, 0), shape_index(blocker.shape, lit & shadowed), sample)
+
+
+def no_light(groups: LightGroups | None) -> list[mi.Color3f]:
+    return [mi.Color3f(0) for _ in groups.sizes] if groups else []
+
+
+def added(lights: list[mi.Color3f], group: mi.UInt32, light: mi.Color3f) -> list[mi.Color3f]:
+    """The light of each group, with some more of one."""
+    return [dr.select(group == g, u + light, u) for g, u in enumerate(lights)]
+
+
+def group_sample(unshadowed: list[mi.Color3f], group: mi.UInt32, chance: mi.Float,
+                 arrived: mi.Float, possible: mi.Float, active: mi.Bool,
+                 total: mi.Float) -> GroupSample:
+    """What a ray to a group tells; arrived: v l(w c) / p_k. possible: l(w_k c_k) / p_k."""
+    of_group = mi.Float(0)
+    for g, u in enumerate(unshadowed):
+        of_group = dr.select(group == g, mi.luminance(u), of_group)
+    told = active & (of_group > _DIMMEST * total)
+    scale = dr.select(told, chance / of_group, 0)
+    return GroupSample(unshadowed, dr.select(told, mi.Int32(group), -1), scale * arrived,
+                       scale * possible, dr.select(told, chance, 0))
 
 
 def shape_index(shape: mi.ShapePtr, active: mi.Bool) -> mi.UInt32:
@@ -117,6 +195,13 @@ def contribution(scene: mi.Scene, si: mi.SurfaceInteraction3f, k: mi.UInt32, pla
     value = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(light.d), active)
     c = dr.select(active & (light.pdf > 0), value * weight, 0) / (GRID * GRID)
     return c, light
+
+
+def weight(si: mi.SurfaceInteraction3f, light: mi.DirectionSample3f, emitters: int,
+           active: mi.Bool) -> mi.Float:
+    """Of multiple importance sampling, for a point of a light, as plain light sampling has it."""
+    bsdf_pdf = si.bsdf().pdf(mi.BSDFContext(), si, si.to_local(light.d), active)
+    return dr.select(light.delta, 1, power_heuristic(light.pdf / emitters, bsdf_pdf))
 
 
 def power_heuristic(p: mi.Float, q: mi.Float) -> mi.Float:

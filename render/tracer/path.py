@@ -19,7 +19,7 @@ import drjit as dr
 
 from onespp.render.mitsuba.variant import mi
 
-from .lights import DirectLight, power_heuristic, resample_lights, shape_index
+from .lights import DirectLight, LightGroups, power_heuristic, resample_lights, shape_index
 from .sampler import Sampler
 
 
@@ -47,7 +47,7 @@ class Radiance:
 
 @dr.syntax
 def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
-          max_depth: int, resampled: bool = False) -> Radiance:
+          max_depth: int, resampled: bool = False, groups: LightGroups | None = None) -> Radiance:
     """One path a lane.
 
     Args:
@@ -55,6 +55,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         sampler: random numbers, advanced by the call.
         max_depth: longest path in segments, as in Mitsuba (1: emission, 2: direct light).
         resampled: direct light at the first hit by resampling instead of by MIS.
+        groups: of lights, which the shadow ray then tells apart.
     """
     context = mi.BSDFContext()
     ray = mi.Ray3f(ray)
@@ -74,7 +75,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     if dr.hint(resampled and max_depth > 1, mode="scalar"):
         first = pi.compute_surface_interaction(ray)
         smooth = first.is_valid() & mi.has_flag(first.bsdf().flags(), mi.BSDFFlags.Smooth)
-        split = resample_lights(scene, first, sampler, smooth)
+        split = resample_lights(scene, first, sampler, smooth, groups)
         direct += split.direct
         arrived += split.direct
 

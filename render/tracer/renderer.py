@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import drjit as dr
 import numpy as np
 
-from onespp.render.channels import FRAME, GLOSS, RADIANCE, REPLAY, SHADOW, SPLIT
+from onespp.render.channels import FRAME, GLOSS, GROUPED, RADIANCE, REPLAY, SHADOW, SPLIT, UNSHADOWED
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.mitsuba.variant import mi
 
 from .camera_rays import camera_matrices
 from .gbuffer import GBUFFER, PrimaryHit
+from .light_groups import find_groups
+from .lights import LightGroups
 from .path import trace
 from .replay import replay
 from .sampler import FRAME_STREAM, REFERENCE_STREAM, Sobol, keys_from_seed
@@ -27,13 +30,24 @@ class Renderer(View):
     @property
     def channels(self) -> tuple[str, ...]:
         """All channels of its frames that are not the same in any scene of this kind."""
-        return (FRAME + (SPLIT + SHADOW if self._splits else ())
+        return (FRAME + (SPLIT + SHADOW if self._splits else ()) + self._grouped
                 + (GLOSS if self.stage.glossy else ()))
 
     @property
     def _splits(self) -> bool:
         """Whether direct light is split: paths of one segment have none."""
         return self.direct == "resampled" and self.scene.max_depth > 1
+
+    @cached_property
+    def groups(self) -> LightGroups | None:
+        """Of lights, each with a visibility of its own; None where there is one, or no split."""
+        return find_groups(self) if self._splits else None
+
+    @property
+    def _grouped(self) -> tuple[str, ...]:
+        """The channels of groups that its frames have."""
+        count = len(self.groups.sizes) if self.groups else 0
+        return ("group", "group_sample", *UNSHADOWED[:count]) if count else ()
 
     def frame(self, index: int, seed: int = 0, channels: Sequence[str] = FRAME) -> Frame:
         """One frame at 1 spp: one kernel, only the channels asked for.
@@ -45,10 +59,14 @@ class Renderer(View):
         if not self._splits and set(channels) & {*SPLIT, *SHADOW}:
             raise InputError(f"the channels {', '.join(SPLIT + SHADOW)} need --direct resampled "
                              "and a scene of max_depth 2 or more")
+        if lacking := [c for c in channels if c in GROUPED and c not in self._grouped]:
+            raise InputError(f"the channels {', '.join(lacking)} need --direct resampled and a "
+                             f"scene of more lights than '{self.scene.name}' has")
+        groups = self.groups if set(channels) & {*GROUPED} else None
         before = index - 1 if index > 0 else None
         replayed = replay(self, index, before, seed) if set(channels) & set(REPLAY) else {}
         self.stage.set_frame(index)
-        planes = self._trace_frame(index, seed, [c for c in channels if c not in REPLAY])
+        planes = self._trace_frame(index, seed, [c for c in channels if c not in REPLAY], groups)
         dr.eval(planes)
         matrices = camera_matrices(self.scene.camera, index, self.height, self.width)
         images = {name: self._image(value) for name, value in planes.items()}
@@ -73,7 +91,8 @@ class Renderer(View):
         dr.eval(color)
         return self._image(color)
 
-    def _trace_frame(self, index: int, seed: int, channels: Sequence[str]) -> dict:
+    def _trace_frame(self, index: int, seed: int, channels: Sequence[str],
+                     groups: LightGroups | None) -> dict:
         with dr.suspend_grad():
             scene = self.stage.mi_scene
             pixel = dr.arange(mi.UInt32, self.height * self.width)
@@ -81,10 +100,10 @@ class Renderer(View):
             ray, depth_per_length = rays.at(*self.centres(pixel))
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
             planes = {}
-            if set(channels) & {*RADIANCE, *SPLIT, *SHADOW, *GLOSS}:
+            if set(channels) & {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS}:
                 sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
                 radiance = trace(scene, ray, pi, sampler, self.scene.max_depth,
-                                 self.direct == "resampled")
+                                 self.direct == "resampled", groups)
                 unit = dr.opaque(mi.Float, self.stage.unit)
                 planes = {
                     "color": radiance.emission + radiance.direct + radiance.indirect,
@@ -104,6 +123,12 @@ class Renderer(View):
                         "blocker_distance": radiance.shadow_ray.blocker_distance * unit,
                         "blocker_id": self.stage.object_id(radiance.shadow_ray.blocker_shape),
                     }
+                    if told := radiance.shadow_ray.groups:
+                        planes |= {
+                            "group": told.group,
+                            "group_sample": mi.Vector3f(told.visibility, told.weight, told.chance),
+                            **dict(zip(UNSHADOWED, told.unshadowed)),
+                        }
             if set(channels) & set(GBUFFER):
                 hit = PrimaryHit(self.stage, pi.compute_surface_interaction(ray), depth_per_length)
                 planes |= {name: GBUFFER[name](hit) for name in channels if name in GBUFFER}
