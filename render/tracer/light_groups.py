@@ -18,28 +18,28 @@ import numpy as np
 
 from onespp.render.channels import MOST_GROUPS
 from onespp.render.host.aligned import aligned
+from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 
 from .camera_rays import pixel_rays
 from .lights import GRID, LightGroups, contribution
-from .view import View
 
 _HEIGHT, _WIDTH = 18, 32
 _FRAMES = 4  # of the scene that are looked at
 _ROUNDS = 10
 
 
-def find_groups(view: View) -> LightGroups | None:
-    """The groups of a scene's lights, None for one light. May set the stage to another frame."""
-    count = len(view.stage.mi_scene.emitters())
+def find_groups(stage: MitsubaScene) -> LightGroups | None:
+    """The groups of a scene's lights, None for one light. May move the stage."""
+    count = len(stage.mi_scene.emitters())
     if count < 2:
         return None
     if count <= MOST_GROUPS:
         groups = np.arange(count)
     else:
-        last = view.scene.frames - 1
+        last = stage.description.frames - 1
         at = sorted({round(last * i / (_FRAMES - 1)) for i in range(_FRAMES)})
-        groups = share_out(np.concatenate([_luminances(view, i) for i in at], axis=1))
+        groups = share_out(np.concatenate([_luminances(stage, i) for i in at], axis=1))
     sizes = np.bincount(groups)
     return LightGroups(aligned(mi.UInt32, groups.astype(np.uint32)), tuple(map(int, sizes)))
 
@@ -68,16 +68,16 @@ def share_out(luminances: np.ndarray, count: int = MOST_GROUPS) -> np.ndarray:
     return groups
 
 
-def _luminances(view: View, index: int) -> np.ndarray:
+def _luminances(stage: MitsubaScene, index: int) -> np.ndarray:
     """(emitters, points) of what each light would give points of a frame."""
-    view.stage.set_frame(index)
-    scene = view.stage.mi_scene
+    stage.set_frame(index)
+    scene = stage.mi_scene
     emitters, points = len(scene.emitters()), _HEIGHT * _WIDTH
     lane = dr.arange(mi.UInt32, emitters * points)
     emitter, point = lane // points, lane % points
     row = point // _WIDTH
     with dr.suspend_grad():
-        ray, _ = pixel_rays(view.stage, _HEIGHT, _WIDTH).at(
+        ray, _ = pixel_rays(stage, _HEIGHT, _WIDTH).at(
             mi.Float(point - row * _WIDTH) + 0.5, mi.Float(row) + 0.5)
         si = scene.ray_intersect(ray)
         total = mi.Float(0)

@@ -20,14 +20,15 @@ lights that touch the surface. The uniform part DELTA reaches lights whose midpo
 the horizon.
 
 Where several lights meet, V is noise of which of them was picked. So lights are in groups g
-(`light_groups.py`) with a visibility each. P_g is the sum of p_k over the strata of g, w_k the
-weight of k's midpoint. The ray, if it went to g, tells
+(`light_groups.py`) with a visibility each. There w_k c_k is in the place of c_k where strata are
+picked, w_k being the weight of k's midpoint; U_g is its sum over the strata of g, P_g that of p_k.
+The ray, if it went to g, tells
 
-    y = v l(w c) P_g / (p_k l(U_g)),   omega = l(w_k c_k) P_g / (p_k l(U_g)),   U_g = sum w_k c_k.
+    y = v l(w c) P_g / (p_k l(U_g)),   omega = l(w_k c_k) P_g / (p_k l(U_g)).
 
 Over the picks in g, omega has the mean 1 and y that of V_g, the share of U_g that arrives: the sum
-of y over that of omega, over pixels that saw the same lights, is V_g without noise of choice. What
-the BSDF's sample runs into is in no group.
+of y over that of omega, over pixels that see the same of g, is V_g without noise of choice. What
+the BSDF's sample runs into is in no group; unshadowed, it is U - sum U_g.
 
 Source: resampled importance sampling (Talbot et al. 2005) with the ratio estimator of Heitz et al.
 2018 ("Combining analytic direct illumination and stochastic shadows"), U by midpoints.
@@ -102,24 +103,21 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     left = mi.Float(choice)
     unshadowed, total = mi.Color3f(0), mi.Float(0)
     picked, picked_luminance = mi.UInt32(0), mi.Float(0)
-    by_group, luminances = no_light(groups), no_light(groups)
-    picked_weighted = mi.Float(0)
+    by_group = [mi.Color3f(0) for _ in groups.sizes] if groups else []
     k = mi.UInt32(0)
     while dr.hint(k < strata, max_iterations=strata, label="lights"):
         c, light = contribution(scene, si, k, mi.Point2f(0.5), active)
-        luminance = mi.luminance(c)
         unshadowed += c
+        if dr.hint(groups is not None, mode="scalar"):
+            c = weight(si, light, emitters, active) * c
+            group = dr.gather(mi.UInt32, groups.of_emitter, k // (GRID * GRID), active)
+            by_group = added(by_group, group, c)
+        luminance = mi.luminance(c)
         total += luminance
         share = dr.select(total > 0, luminance / total, 0)
         taken = left < share
         picked = dr.select(taken, k, picked)
         picked_luminance = dr.select(taken, luminance, picked_luminance)
-        if dr.hint(groups is not None, mode="scalar"):
-            weighted = weight(si, light, emitters, active) * c
-            picked_weighted = dr.select(taken, mi.luminance(weighted), picked_weighted)
-            group = dr.gather(mi.UInt32, groups.of_emitter, k // (GRID * GRID), active)
-            by_group = added(by_group, group, weighted)
-            luminances = added(luminances, group, mi.Color3f(luminance))
         # What is left of the random number is uniform again.
         left = dr.select(taken, left / share, (left - share) / dr.maximum(1 - share, 1e-9))
         left = dr.clip(left, 0, 1 - 2.0**-24)
@@ -129,7 +127,9 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     uniform = dark | (left < DELTA)
     anywhere = dr.select(dark, choice, left / DELTA)
     picked = dr.select(uniform, dr.minimum(mi.UInt32(anywhere * strata), strata - 1), picked)
-    middle, middle_light = contribution(scene, si, picked, mi.Point2f(0.5), active & uniform)
+    middle, light = contribution(scene, si, picked, mi.Point2f(0.5), active & uniform)
+    if dr.hint(groups is not None, mode="scalar"):
+        middle = weight(si, light, emitters, active & uniform) * middle
     picked_luminance = dr.select(uniform, mi.luminance(middle), picked_luminance)
     p = dr.select(dark, 1, (1 - DELTA) * strata * picked_luminance / total + DELTA) / strata
 
@@ -142,24 +142,13 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     direct = dr.select(lit & ~shadowed, w * c / p, 0)
     sample = None
     if dr.hint(groups is not None, mode="scalar"):
-        middle_weighted = weight(si, middle_light, emitters, active & uniform) * middle
-        picked_weighted = dr.select(uniform, mi.luminance(middle_weighted), picked_weighted)
         group = dr.gather(mi.UInt32, groups.of_emitter, picked // (GRID * GRID), active)
-        even = dr.select(dark, 1, DELTA)
-        chance = mi.Float(0)
-        for g, size in enumerate(groups.sizes):
-            share = dr.select(dark, 0, (1 - DELTA) * luminances[g].x / total)
-            chance = dr.select(group == g, share + even * (size / emitters), chance)
-        sample = group_sample(by_group, group, chance, mi.luminance(direct), picked_weighted / p,
-                              active, total)
+        sample = group_sample(groups, by_group, group, total, mi.luminance(direct),
+                              picked_luminance / p, active)
     return DirectLight(
         direct, unshadowed,
         dr.select(lit, light.p - si.p, 0), shape_index(light.emitter.get_shape(), lit),
         dr.select(lit & shadowed, blocker.t, 0), shape_index(blocker.shape, lit & shadowed), sample)
-
-
-def no_light(groups: LightGroups | None) -> list[mi.Color3f]:
-    return [mi.Color3f(0) for _ in groups.sizes] if groups else []
 
 
 def added(lights: list[mi.Color3f], group: mi.UInt32, light: mi.Color3f) -> list[mi.Color3f]:
@@ -167,13 +156,16 @@ def added(lights: list[mi.Color3f], group: mi.UInt32, light: mi.Color3f) -> list
     return [dr.select(group == g, u + light, u) for g, u in enumerate(lights)]
 
 
-def group_sample(unshadowed: list[mi.Color3f], group: mi.UInt32, chance: mi.Float,
-                 arrived: mi.Float, possible: mi.Float, active: mi.Bool,
-                 total: mi.Float) -> GroupSample:
+def group_sample(groups: LightGroups, unshadowed: list[mi.Color3f], group: mi.UInt32,
+                 total: mi.Float, arrived: mi.Float, possible: mi.Float,
+                 active: mi.Bool) -> GroupSample:
     """What a ray to a group tells; arrived: v l(w c) / p_k. possible: l(w_k c_k) / p_k."""
-    of_group = mi.Float(0)
-    for g, u in enumerate(unshadowed):
-        of_group = dr.select(group == g, mi.luminance(u), of_group)
+    chance, of_group = mi.Float(0), mi.Float(0)
+    for g, size in enumerate(groups.sizes):
+        luminance, is_it = mi.luminance(unshadowed[g]), group == g
+        of_group = dr.select(is_it, luminance, of_group)
+        share = (1 - DELTA) * luminance / total + DELTA * (size / sum(groups.sizes))
+        chance = dr.select(is_it, share, chance)
     told = active & (of_group > _DIMMEST * total)
     scale = dr.select(told, chance / of_group, 0)
     return GroupSample(unshadowed, dr.select(told, mi.Int32(group), -1), scale * arrived,

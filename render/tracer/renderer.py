@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any
 
 import drjit as dr
 import numpy as np
 
-from onespp.render.channels import FRAME, GLOSS, GROUPED, RADIANCE, REPLAY, SHADOW, SPLIT, UNSHADOWED
+from onespp.render.channels import (
+    FRAME,
+    GLOSS,
+    GROUPED,
+    RADIANCE,
+    REPLAY,
+    SHADOW,
+    SPLIT,
+    UNSHADOWED,
+)
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.mitsuba.variant import mi
 
 from .camera_rays import camera_matrices
 from .gbuffer import GBUFFER, PrimaryHit
-from .light_groups import find_groups
-from .lights import LightGroups
 from .path import trace
 from .replay import replay
 from .sampler import FRAME_STREAM, REFERENCE_STREAM, Sobol, keys_from_seed
@@ -30,18 +36,8 @@ class Renderer(View):
     @property
     def channels(self) -> tuple[str, ...]:
         """All channels of its frames that are not the same in any scene of this kind."""
-        return (FRAME + (SPLIT + SHADOW if self._splits else ()) + self._grouped
+        return (FRAME + (SPLIT + SHADOW if self.splits else ()) + self._grouped
                 + (GLOSS if self.stage.glossy else ()))
-
-    @property
-    def _splits(self) -> bool:
-        """Whether direct light is split: paths of one segment have none."""
-        return self.direct == "resampled" and self.scene.max_depth > 1
-
-    @cached_property
-    def groups(self) -> LightGroups | None:
-        """Of lights, each with a visibility of its own; None where there is one, or no split."""
-        return find_groups(self) if self._splits else None
 
     @property
     def _grouped(self) -> tuple[str, ...]:
@@ -56,17 +52,17 @@ class Renderer(View):
         are rendered: the channels of `replay.py` replay frame `index` - 1, whether or not it is
         asked for, and frame 0 has nothing to replay.
         """
-        if not self._splits and set(channels) & {*SPLIT, *SHADOW}:
+        if not self.splits and set(channels) & {*SPLIT, *SHADOW}:
             raise InputError(f"the channels {', '.join(SPLIT + SHADOW)} need --direct resampled "
                              "and a scene of max_depth 2 or more")
         if lacking := [c for c in channels if c in GROUPED and c not in self._grouped]:
             raise InputError(f"the channels {', '.join(lacking)} need --direct resampled and a "
                              f"scene of more lights than '{self.scene.name}' has")
-        groups = self.groups if set(channels) & {*GROUPED} else None
         before = index - 1 if index > 0 else None
         replayed = replay(self, index, before, seed) if set(channels) & set(REPLAY) else {}
+        _ = self.groups  # before the stage is set: to find them moves it
         self.stage.set_frame(index)
-        planes = self._trace_frame(index, seed, [c for c in channels if c not in REPLAY], groups)
+        planes = self._trace_frame(index, seed, [c for c in channels if c not in REPLAY])
         dr.eval(planes)
         matrices = camera_matrices(self.scene.camera, index, self.height, self.width)
         images = {name: self._image(value) for name, value in planes.items()}
@@ -91,8 +87,7 @@ class Renderer(View):
         dr.eval(color)
         return self._image(color)
 
-    def _trace_frame(self, index: int, seed: int, channels: Sequence[str],
-                     groups: LightGroups | None) -> dict:
+    def _trace_frame(self, index: int, seed: int, channels: Sequence[str]) -> dict:
         with dr.suspend_grad():
             scene = self.stage.mi_scene
             pixel = dr.arange(mi.UInt32, self.height * self.width)
@@ -103,7 +98,7 @@ class Renderer(View):
             if set(channels) & {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS}:
                 sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
                 radiance = trace(scene, ray, pi, sampler, self.scene.max_depth,
-                                 self.direct == "resampled", groups)
+                                 self.direct == "resampled", self.groups)
                 unit = dr.opaque(mi.Float, self.stage.unit)
                 planes = {
                     "color": radiance.emission + radiance.direct + radiance.indirect,
