@@ -10,9 +10,10 @@ cannot blur them. V is capped at `LARGEST_VISIBILITY`; what is above, what U lac
 mirror's image of a lamp) and the colour that one V for all lights misses are left in L, so that
 nothing is lost. G is the image of something else: the surface's albedo is not in it.
 
-Where several lights meet, V is noise of which of them the shadow ray went to. Frames of such a scene
-have groups of lights g, and V several signals: of each group, known where the ray went to it, and
-V_b of what the BSDF's sample finds, B = U - sum U_g, everywhere. With y, omega and P of `lights.py`
+Where several lights meet, V is noise of which of them the shadow ray went to. Frames of such a
+scene have groups of lights g, and several signals V_g: each is known where the ray went to its
+group. What the BSDF's sample finds, B = U - sum U_g unshadowed, has a V_b, known everywhere. With
+y, omega and P of `lights.py`,
 
     colour = E + V_b B + sum V_g U_g + a L + G     V_b = (l(U) V - y l(U_g) / P) / l(B)
     L = (I - G + D - V_b B - y U_g / P) / a        sum over pixels of y = that of omega V_g.

@@ -1,11 +1,11 @@
 """Which planes the filtered innovation works on: the one place that knows.
 
 A frame has signals of three kinds (`signals.py`), each of three planes or one. Those of groups of
-lights are the last, and *sparse*: a pixel's shadow ray went to one group at most. What is smoothed and
-filtered lies side by side in the planes of one buffer, in the order of leaving: diffuse light goes
-through all levels, visibility and glossy light (the sharp signals) through fewer, energies through
-the first ones. A level works on the planes that are left, the first so many. Each of them goes by
-the rule of its own `PlaneRule`, from which kernels are built.
+lights are the last, and *sparse*: a pixel's shadow ray went to one group at most. What is smoothed
+and filtered lies side by side in the planes of one buffer, in the order of leaving: diffuse light
+goes through all levels, visibility and glossy light (the sharp signals) through fewer, energies
+through the first ones. A level works on the planes that are left, the first so many. Each of them
+goes by the rule of its own `PlaneRule`, from which kernels are built.
 
 A record of the history holds first the visibility that shadow rays tell of, the last signal or
 those of groups, so that it can be looked up alone.
