@@ -21,6 +21,7 @@ from .output import FEWEST_SAMPLES, fade_out
 
 MIN_NOISE = 0.25               # share of the innovation's energy that is at least noise of d
 _FILLED = 0.5                  # samples that what was filtered counts for
+_UNKNOWN = 0.5                 # visibility that nothing is known of
 _MOST_SAMPLES = 64.0
 _LEAST_OMEGA = 0.1             # that a lone sample is divided by
 _MIN_ENERGY = 1e-20            # square of a luminance that is taken for 0
@@ -83,8 +84,9 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
             norm = _norm(smoothed.weights[g])
             followed = dr.fma(gain, norm * wide.luminance, old.history)
             rest = dr.fma(-old.weight * norm, wide.luminance, e.luminance)
+            alone = dr.select(first[g] >= 0, first[g], _UNKNOWN)
             merged_signal = Signal(None, dr.select(
-                is_new, dr.maximum(first[g], 0), dr.fma(dr.minimum(a, 1), rest, followed)), None)
+                is_new, alone, dr.fma(dr.minimum(a, 1), rest, followed)), None)
             energy *= _norm(smoothed.energy_weights[g])
             samples = old.samples + omega
             a = dr.select(is_new, dr.select(omega > 0, type(a)(1), 0), dr.minimum(a * omega, 1))

@@ -19,7 +19,7 @@ from onespp.denoise.jit.taps import Offset, Taps, window
 from .layout import NoisySignal, SignalLayout
 from .smoothing import footprint
 
-FEWEST_SAMPLES = 1e-3          # that a sparse signal's pixel counts for where it has none
+FEWEST_SAMPLES = 1e-5          # that a sparse signal's pixel counts for where it has none
 _NEVER = -1e3                  # log2 of a weight that is 0
 
 
