@@ -38,7 +38,7 @@ def with_groups(frame, visible, seed):
     images = {f"unshadowed{g}": u for g, u in enumerate(each[:-1])}
     return with_images(
         frame, **images, unshadowed=whole, direct=direct, group=group,
-        group_sample=np.stack([y, omega, chance], -1), color=direct + frame["indirect"],
+        group_sample=np.stack([y, omega, chance], -1), color=frame["emission"] + direct + frame["indirect"],
         visibility=np.where(possible > 0, arrived / np.where(possible > 0, possible, 1), 0))
 
 
@@ -48,7 +48,8 @@ def grouped(height, width, count=3, visible=(0.9, 0.3, 0.6)):
 
 
 @pytest.mark.parametrize(("height", "width", "levels", "sharp_levels", "groups", "shadows"), [
-    (19, 26, 4, 2, 3, True), (19, 26, 4, 3, 4, False), (7, 5, 4, 2, 2, True), (1, 9, 4, 2, 1, True)])
+    (19, 26, 4, 2, 3, True), (19, 26, 4, 3, 4, False), (7, 5, 4, 2, 2, True),
+    (1, 9, 4, 2, 1, True)])
 def test_it_is_the_formula_in_float64(height, width, levels, sharp_levels, groups, shadows):
     frames = grouped(height, width, 4, (0.9, 0.3, 0.6, 0.2)[:groups])
     method = FilteredInnovation(
