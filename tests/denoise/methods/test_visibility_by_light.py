@@ -38,7 +38,8 @@ def with_groups(frame, visible, seed):
     images = {f"unshadowed{g}": u for g, u in enumerate(each[:-1])}
     return with_images(
         frame, **images, unshadowed=whole, direct=direct, group=group,
-        group_sample=np.stack([y, omega, chance], -1), color=frame["emission"] + direct + frame["indirect"],
+        group_sample=np.stack([y, omega, chance], -1),
+        color=frame["emission"] + direct + frame["indirect"],
         visibility=np.where(possible > 0, arrived / np.where(possible > 0, possible, 1), 0))
 
 
