@@ -32,8 +32,10 @@ from onespp.denoise.methods.separable import BilateralSeparable
 from onespp.denoise.methods.svgf import Svgf
 from onespp.denoise.methods.temporal import Temporal
 from onespp.denoise.peers.oidn import Oidn
+from onespp.denoise.peers.oidn_split import OidnSplit
 from onespp.denoise.peers.optix import Optix
 from onespp.denoise.peers.temporal_oidn import TemporalOidn
+from onespp.denoise.peers.temporal_oidn_split import TemporalOidnSplit
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.host import backend
@@ -204,7 +206,9 @@ PEERS: Mapping[str, Peer] = MappingProxyType({
     **{f"oidn-{quality}": Peer(partial(Oidn, quality), _has_oidn,
                                f"Intel Open Image Denoise, quality {quality}, frame by frame.")
        for quality in oidn.QUALITIES},
-    "temporal-oidn": Peer(TemporalOidn, _has_oidn, (TemporalOidn.__doc__ or "").splitlines()[0]),
+    **{name: Peer(kind, _has_oidn, (kind.__doc__ or "").splitlines()[0])
+       for name, kind in (("oidn-split", OidnSplit), ("temporal-oidn", TemporalOidn),
+                          ("temporal-oidn-split", TemporalOidnSplit))},
     "optix": Peer(Optix, _has_cuda, "NVIDIA's OptiX denoiser, frame by frame."),
     "optix-temporal": Peer(partial(Optix, temporal=True), _has_cuda,
                            "NVIDIA's OptiX denoiser with its last result."),

@@ -1,7 +1,8 @@
 """The scenes there are, and how one of your own is found.
 
 To add a scene: one file with a function that returns it, and one row here. (The hard ones, which
-are for testing, have their table in `scenes/hard`, and are called `hard/NAME`.)
+are for testing, have their table in `scenes/hard`, and are called `hard/NAME`; those drawn from a
+seed, `generated/NUMBER`, are in `scenes/generated`.)
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from onespp.scenes.room.room import room
 
 from .box import box
 from .description import Scene, SceneError
+from .generated import COUNT, generated
 from .hard import HARD
 from .scene_file import load_file
 
@@ -22,6 +24,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "room": room,
 }
 _HARD = "hard/"
+GENERATED = tuple(f"generated/{number}" for number in range(COUNT))
 
 
 def load(name: str) -> Scene:
@@ -35,14 +38,17 @@ def load(name: str) -> Scene:
         return SCENES[name]()
     if name.startswith(_HARD) and name[len(_HARD):] in HARD:
         return HARD[name[len(_HARD):]].make()
+    if name in GENERATED:
+        return generated(GENERATED.index(name))
     if not name.endswith(".py"):
         raise SceneError(_unknown(name))
     return load_file(Path(name))
 
 
 def _unknown(name: str) -> str:
-    known = (*SCENES, *(_HARD + hard for hard in HARD))
+    known = (*SCENES, *(_HARD + hard for hard in HARD), *GENERATED)
     close = difflib.get_close_matches(name, known, n=1)
     hint = f"did you mean '{close[0]}'? " if close else ""
     return (f"unknown scene '{name}': {hint}there are {', '.join(sorted(SCENES))}, "
-            f"{_HARD}NAME (`onespp scenes` lists them), or give the path of a .py file")
+            f"{_HARD}NAME and {GENERATED[0]} to {COUNT - 1} (`onespp scenes` lists them), "
+            "or give the path of a .py file")

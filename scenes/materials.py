@@ -87,6 +87,17 @@ def metal(color: Color = (0.95, 0.93, 0.88), roughness: float = 0.15) -> dict[st
         "alpha": float(roughness), "specular_reflectance": color}}
 
 
+def mirror(color: Color = (0.9, 0.9, 0.9)) -> dict[str, Any]:
+    """A smooth metal: its reflections are sharp. Lamps that it shows are found by chance alone."""
+    return {"type": "twosided", "bsdf": {"type": "conductor", "material": "none",
+                                         "specular_reflectance": color}}
+
+
+def glass(index: float = 1.5) -> dict[str, Any]:
+    """Clear glass, for closed surfaces whose outside is where their normals point."""
+    return {"type": "dielectric", "int_ior": float(index)}
+
+
 def checks(a: Color, b: Color, repeat: tuple[float, float] = (4, 4)) -> dict[str, Any]:
     """A checkerboard with `repeat` pairs of squares along u and v."""
     return {"type": "checkerboard", "color0": a, "color1": b,

@@ -32,7 +32,8 @@ ROOMS = (
     "onespp.render", "onespp.render.files", "onespp.render.host",
     "onespp.render.frame", "onespp.render.channels", "onespp.render.progress",
     "onespp.render.errors",
-    "onespp.scenes.catalog", "onespp.scenes.hard", "onespp.scenes.room", "onespp.scenes",
+    "onespp.scenes.catalog", "onespp.scenes.generated", "onespp.scenes.hard", "onespp.scenes.room",
+    "onespp.scenes",
     "onespp",
 )
 MOST_FILES = 12

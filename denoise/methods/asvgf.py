@@ -4,9 +4,10 @@ Symbols: now, before the luminances of a sample of the last frame, shaded again 
 same random numbers (`render/tracer/replay.py`); S the 3x3 strata of the image; F an a-trous filter
 over strata, {1/16, 1/4, 3/8, 1/4, 1/16}^2 at steps 1, 2, 4, ...
 
-    g = F[sum |now - before|] / F[sum max(now, before)],  lambda = clamp(gradient_scale g, 0, 1)
+    g = |F[sum now - before]| / F[sum max(now, before)],  lambda = clamp(gradient_scale g, 0, 1)
 
 of direct and indirect light each; what lambda does to their histories: `svgf_accumulation.py`.
+F takes differences with their sign: samples that differ by chance cancel, a change of light stays.
 
 Source: Schied, Peters and Dachsbacher 2018, "Gradient estimation for real-time adaptive temporal
 filtering", doi:10.1145/3233301. Defaults of alpha and history length are Quake II RTX's; those of
@@ -99,7 +100,7 @@ class OfLights(NamedTuple):
 
 
 class StrataSums(NamedTuple):
-    """sum |now - before| and sum max(now, before) of each stratum, or means of these."""
+    """sum now - before and sum max(now, before) of each stratum, or means of these."""
 
     change: OfLights
     largest: OfLights
@@ -145,7 +146,7 @@ class AsvgfState(RecordState[Passes]):
 
 
 def gather_strata(now: np.ndarray, before: np.ndarray, count: int) -> np.ndarray:
-    """(ceil(h / 3), ceil(w / 3), 4) float32: the sums of |now - before|, then of max(now, before).
+    """(ceil(h / 3), ceil(w / 3), 4) float32: the sums of now - before, then of max(now, before).
 
     Args:
         now, before: (h, w, 2), direct and indirect; below 0 or not finite: no sample.
@@ -157,11 +158,11 @@ def gather_strata(now: np.ndarray, before: np.ndarray, count: int) -> np.ndarray
     now, before = (np.where(sampled, a, 0) for a in (now, before))
     if count == 1:
         now, before = (np.repeat(a.sum(-1, keepdims=True), 2, axis=-1) for a in (now, before))
-    both = np.concatenate([np.abs(now - before), np.maximum(now, before)], -1)
+    both = np.concatenate([now - before, np.maximum(now, before)], -1)
     padded = np.pad(both, [(0, -height % STRATUM), (0, -width % STRATUM), (0, 0)])
     rows, columns = padded.shape[0] // STRATUM, padded.shape[1] // STRATUM
     blocks = padded.reshape(rows, STRATUM, columns, STRATUM, 4)
-    return blocks.sum((1, 3)).clip(0, 1e18).astype(np.float32)
+    return blocks.sum((1, 3)).clip(-1e18, 1e18).astype(np.float32)
 
 
 def blur(taps: Taps[StrataSums], center: StrataSums) -> StrataSums:
@@ -185,7 +186,7 @@ def spread_strata(stencil: Stencil, strata: Stencil, sums: StrataSums, scale: Fl
 
     def change_of(light: int) -> Float:
         change, most = (dr.gather(stencil.Float, s[light], lane) for s in sums)
-        g = dr.select(most > _LEAST, change / dr.maximum(most, _LEAST), 0)
+        g = dr.select(most > _LEAST, dr.abs(change) / dr.maximum(most, _LEAST), 0)
         return dr.minimum(g * scale, 1)
 
     return OfLights(change_of(0), change_of(1))

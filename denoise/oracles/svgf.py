@@ -143,7 +143,7 @@ def shading_changes(frame: Frame, levels: int = 3, scale: float = 1) -> np.ndarr
     height, width, _ = now.shape
     sums = np.zeros((2, -(-height // 3), -(-width // 3), 2))
     for y, x in np.argwhere((np.minimum(now, before) >= 0).all(-1)):
-        sums[0, y // 3, x // 3] += np.abs(now[y, x] - before[y, x])
+        sums[0, y // 3, x // 3] += now[y, x] - before[y, x]
         sums[1, y // 3, x // 3] += np.maximum(now[y, x], before[y, x])
     h = {0: 3 / 8, 1: 1 / 4, 2: 1 / 16}
     _, rows, columns, _ = sums.shape
@@ -155,7 +155,7 @@ def shading_changes(frame: Frame, levels: int = 3, scale: float = 1) -> np.ndarr
             for kx in range(-2, 3):
                 top, left = (2 + ky) * step, (2 + kx) * step
                 sums += h[abs(ky)] * h[abs(kx)] * padded[:, top:top + rows, left:left + columns]
-    g = np.where(sums[1] > 1e-6, sums[0] / np.maximum(sums[1], 1e-6), 0)
+    g = np.where(sums[1] > 1e-6, np.abs(sums[0]) / np.maximum(sums[1], 1e-6), 0)
     return np.minimum(scale * g, 1).repeat(3, 0).repeat(3, 1)[:height, :width]
 
 

@@ -2,6 +2,9 @@
 
 For each scene two scored folders: frames of the plain estimator, which any renderer gives, and of
 ours; the peer gets both inputs, the method the second. Everything is read from their scores.json.
+
+The peer `BEST` is, on each of them, the one of `OIDN_FORMS` that has the highest mean PSNR there:
+chosen with knowledge of the truth, in its favour.
 """
 
 from __future__ import annotations
@@ -12,6 +15,8 @@ from dataclasses import dataclass
 from onespp.denoise.score.scorecard import MethodScore, Scores
 from onespp.render.errors import InputError
 
+BEST = "best"
+OIDN_FORMS = ("oidn-high", "oidn-split", "temporal-oidn", "temporal-oidn-split")
 CAUSES = ("glossy", "disoccluded", "light")
 
 
@@ -22,6 +27,20 @@ class Pair:
     method: MethodScore
     peer: MethodScore
     plain: MethodScore
+
+
+def peer_in(scores: Scores, peer: str, where: str) -> str:
+    """The method that a peer's name stands for in some scores.
+
+    Raises:
+        InputError: the scores, which are those of `where`, lack it.
+    """
+    forms = OIDN_FORMS if peer == BEST else (peer,)
+    there = [form for form in forms if form in scores.methods]
+    if not there:
+        wanted = " or ".join(f"'{form}'" for form in forms)
+        raise InputError(f"the scores of {where} lack {wanted}: denoise by it and score")
+    return max(there, key=lambda form: psnr_of(scores.methods[form])) if there[1:] else there[0]
 
 
 def psnr_of(score: MethodScore, frame: int | None = None) -> float:
@@ -75,12 +94,12 @@ def markdown(method: str, peer: str, scenes: dict[str, tuple[Scores, Scores]]) -
     """
     pairs = {}
     for name, (plain, ours) in scenes.items():
-        for scores, wanted in ((plain, (peer,)), (ours, (method, peer))):
-            for key in wanted:
-                if key not in scores.methods:
-                    raise InputError(f"the scores of {name} lack '{key}': denoise by it and score")
-        pairs[name] = Pair(ours.methods[method], ours.methods[peer], plain.methods[peer])
-    lines = [f"| `{method}` and `{peer}` | " + " | ".join(pairs) + " |",
+        if method not in ours.methods:
+            raise InputError(f"the scores of {name} lack '{method}': denoise by it and score")
+        on_plain, on_ours = (peer_in(scores, peer, name) for scores in (plain, ours))
+        pairs[name] = Pair(ours.methods[method], ours.methods[on_ours], plain.methods[on_plain])
+    other = "the best form of OIDN" if peer == BEST else f"`{peer}`"
+    lines = [f"| `{method}` and {other} | " + " | ".join(pairs) + " |",
              "| --- |" + " --- |" * len(pairs)]
     for row, (measure, form) in ROWS.items():
         values = [measure(pair) for pair in pairs.values()]

@@ -8,7 +8,6 @@ from onespp.denoise.cli.ablate import ablate
 from onespp.denoise.cli.bench import bench
 from onespp.denoise.cli.compare import compare
 from onespp.denoise.cli.denoise import denoise
-from onespp.denoise.cli.lead import lead
 from onespp.denoise.cli.report import report
 from onespp.denoise.cli.score import score
 from onespp.denoise.cli.time import time_
@@ -18,6 +17,7 @@ from onespp.render.cli.terminal import run as run_command
 
 from .doctor import doctor
 from .hard import hard
+from .lead import lead
 from .run import run
 from .scenes import scenes
 

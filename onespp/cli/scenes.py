@@ -21,3 +21,6 @@ def scenes() -> None:
     for hard_one in HARD.values():
         scene = hard_one.make()
         click.echo(f"    {scene.name}: {scene.about}")
+    click.echo("\nScenes drawn from a seed; the second half is kept to check with:")
+    for name in catalog.GENERATED:
+        click.echo(f"    {name}: {catalog.load(name).about}")

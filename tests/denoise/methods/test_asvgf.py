@@ -96,7 +96,7 @@ def test_strata_add_up_samples_and_skip_what_is_none():
     now[3, 4], before[3, 4] = (np.nan, 1), (1, 1)
     sums = gather_strata(now, before, 2)
     assert sums.shape == (2, 2, 4)
-    np.testing.assert_array_equal(sums[0, 0], [3, 2, 8, 5])
+    np.testing.assert_array_equal(sums[0, 0], [-1, 2, 8, 5])
     assert (sums.reshape(-1, 4)[1:] == 0).all()
     np.testing.assert_array_equal(gather_strata(now, before, 1)[0, 0], [1, 1, 11, 11])
 
@@ -127,3 +127,14 @@ def test_an_import_is_one_signal():
     result = run(Asvgf(), [with_change(frame), with_change(frame, 0.5, 0.5)])
     assert result.shape == (9, 11, 3)
     assert np.isfinite(result).all()
+
+
+def test_samples_that_rise_and_fall_alike_change_nothing():
+    """Noise of the gradients: F filters differences with their sign, of which none is left."""
+    *first, last = still(4, 48, 48)
+    changed = with_change(last, direct=1.4)
+    rises = (np.mgrid[:48, :48].sum(0) // 3 % 2 == 0)[..., None]
+    falls = np.where(changed["replay_before"] < 0, -1, changed["replay_before"] * [0.6, 1])
+    noisy = with_images(changed, replay=np.where(rises, changed["replay"], falls))
+    length = records(run_and_keep(Asvgf(**PLAIN), [*first, noisy])[1])[12:36, 12:36, 0]
+    assert length.min() > 3.9

@@ -18,7 +18,8 @@ from tests.support.frames import make_frame, noisy, with_images
 H, W = 40, 48
 
 needs_oidn = pytest.mark.skipif(not oidn.AVAILABLE, reason="pyoidn is not installed")
-each = pytest.mark.parametrize("name", ["oidn-fast", "temporal-oidn"])
+each = pytest.mark.parametrize("name", ["oidn-fast", "oidn-split", "temporal-oidn",
+                                          "temporal-oidn-split"])
 
 
 def run(name, *frames, **settings):
@@ -162,3 +163,67 @@ def test_missing_channels_and_other_sizes_are_named(name):
         method(frame, method.init(H + 1, W))
     with pytest.raises(InputError, match="empty"):
         method.init(0, 7)
+
+
+def split_frame(visible: np.ndarray, seed: int = 0):
+    """A frame with textured unshadowed light of which `visible` arrives, and even other light."""
+    frame = make_frame(H, W, wall_end=1e9)
+    rng = np.random.default_rng(7)
+    unshadowed = rng.uniform(0.2, 2.0, (H, W, 3)).astype(np.float32)
+    direct = visible[..., None] * unshadowed
+    rest = np.full((H, W, 3), 0.3, np.float32)
+    noise = np.random.default_rng(seed).gamma(0.5, 2.0, (H, W, 1)).astype(np.float32)
+    return with_images(frame, color=direct + rest * noise, direct=direct, indirect=rest * noise,
+                       unshadowed=unshadowed, visibility=visible), direct + rest
+
+
+@needs_oidn
+@pytest.mark.parametrize("name", ["oidn-split", "temporal-oidn-split"])
+def test_what_is_in_unshadowed_light_stays_as_fine_as_it_is(name):
+    """Visibility is 1: all texture is in U, which no filter may touch; plain OIDN blurs it."""
+    frame, truth = split_frame(np.ones((H, W), np.float32))
+    error = np.sqrt(np.mean((run(name, frame, frame) - truth) ** 2))
+    plain = np.sqrt(np.mean((run("oidn-high", frame) - truth) ** 2))
+    assert error < 0.08
+    assert error < 0.35 * plain
+
+
+@needs_oidn
+@pytest.mark.parametrize("name", ["oidn-split", "temporal-oidn-split"])
+def test_half_of_the_shadow_rays_are_half_of_the_light(name):
+    rays = (np.random.default_rng(3).random((4, H, W)) < 0.5).astype(np.float32)
+    frames = [split_frame(seen, seed)[0] for seed, seen in enumerate(rays)]
+    _, truth = split_frame(np.full((H, W), 0.5, np.float32))
+    inner = np.s_[4:-4, 4:-4]
+    ratio = run(name, *frames)[inner].mean() / truth[inner].mean()
+    assert ratio == pytest.approx(1, abs=0.05)
+
+
+@needs_oidn
+def test_light_above_the_cap_of_visibility_and_glossy_light_are_not_lost():
+    visible = np.full((H, W), 5.0, np.float32)
+    frame, truth = split_frame(visible)
+    for name in ("oidn-split", "temporal-oidn-split"):
+        assert run(name, frame).mean() == pytest.approx(truth.mean(), rel=0.05)
+    glossy = with_images(frame, specular=0.5 * frame["indirect"])
+    assert run("temporal-oidn-split", glossy).mean() == pytest.approx(truth.mean(), rel=0.05)
+
+
+@needs_oidn
+@pytest.mark.parametrize(("name", "plain"), [("oidn-split", "oidn-high"),
+                                             ("temporal-oidn-split", "temporal-oidn")])
+def test_frames_without_the_split_are_denoised_as_by_the_plain_form(name, plain):
+    frames = [noisy(make_frame(H, W), seed=i) for i in range(2)]
+    np.testing.assert_array_equal(run(name, *frames), run(plain, *frames))
+
+
+@needs_oidn
+def test_a_shadow_that_moves_leaves_no_trail_in_light_that_stands_still():
+    """Each signal is clamped by its own window: history of visibility stays in visibility."""
+    still = np.ones((H, W), np.float32)
+    moved = still.copy()
+    moved[:, :20] = 0
+    before, _ = split_frame(still)
+    after, truth = split_frame(moved, seed=1)
+    error = np.abs(run("temporal-oidn-split", before, after) - truth)[:, 2:17].mean()
+    assert error < 0.12

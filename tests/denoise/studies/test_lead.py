@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from click.testing import CliRunner
 
-from onespp.denoise.cli.lead import lead
+from onespp.cli.lead import lead
 from onespp.denoise.score.sequence import score
-from onespp.denoise.studies.lead import CAUSES, markdown
+from onespp.denoise.studies.lead import BEST, CAUSES, markdown, peer_in
 from onespp.render.errors import InputError
 from tests.support.report_sequence import make_report_sequence
 
@@ -54,9 +54,28 @@ def test_what_is_missing_is_named(scores):
     found, folder = scores
     with pytest.raises(InputError, match="lack 'magic'"):
         markdown("magic", "rough", {"made": (found, found)})
+    with pytest.raises(InputError, match="lack 'oidn-high' or 'oidn-split'"):
+        markdown("fine", "best", {"made": (found, found)})
     result = CliRunner().invoke(lead, [str(folder)])
     assert isinstance(result.exception, InputError)
     result = CliRunner().invoke(lead, [str(folder), str(folder), "--method", "fine", "--peer",
                                        "rough"])
     assert result.exit_code == 0
     assert "made: 4 frames" in result.output
+    result = CliRunner().invoke(lead, [])
+    assert "give some, or --suite" in str(result.exception)
+
+
+def test_best_is_the_form_that_is_best_on_each_input(scores):
+    found, _ = scores
+    fine, rough = (found.methods[name] for name in ("fine", "rough"))
+    ours = found.model_copy(update={"methods": {
+        "onespp": fine, "oidn-high": rough, "temporal-oidn-split": fine, "input": rough}})
+    plain = found.model_copy(update={"methods": {
+        "oidn-high": fine, "temporal-oidn": rough, "input": rough}})
+    assert peer_in(ours, BEST, "x") == "temporal-oidn-split"
+    assert peer_in(plain, BEST, "x") == "oidn-high"
+    assert peer_in(plain, "temporal-oidn", "x") == "temporal-oidn"
+    text = markdown("onespp", BEST, {"made": (plain, ours)})
+    assert "`onespp` and the best form of OIDN" in text
+    assert text.count("dB | +0.00 |") >= 3

@@ -1,0 +1,151 @@
+"""The command `lead`: how far a method is ahead of a peer."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from onespp.denoise.cli.denoise import denoise_in
+from onespp.render.cli.options import device_option, threads_option, use
+from onespp.render.cli.render import render_to
+from onespp.render.cli.terminal import command_line
+from onespp.render.errors import InputError
+from onespp.render.files.frame_ranges import parse_frames
+from onespp.render.files.lock import writing
+from onespp.render.files.sequence import FrameSequence
+
+if TYPE_CHECKING:
+    from onespp.denoise.score.scorecard import Scores
+
+SIZES = {"box": "256x256", "room": "320x180", "generated/": "160x108"}
+
+
+@click.command()
+@click.argument("folders", nargs=-1, type=click.Path(path_type=Path),
+                metavar="[PLAIN OURS]...")
+@click.option("--method", default="onespp", show_default=True, metavar="NAME")
+@click.option("--peer", default="best", show_default=True, metavar="NAME",
+              help="A method, or best: on each scene the best form of OIDN that was scored.")
+@click.option("--suite", is_flag=True,
+              help="Instead of folders: render box, room, the kept generated scenes and the hard "
+              "ones, export and import some as plain frames, denoise, score, and print what is "
+              "asked for and what was found. What is rendered, and peers' results, are kept.")
+@click.option("--scenes", metavar="PATTERN", default=".", help="Of the suite, scenes whose name "
+              "has this regular expression; default all.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("data/suite"),
+              show_default=True, metavar="DIR", help="Folder of the suite's sequences.")
+@click.option("--size", metavar="WxH", help="Pixels of the suite; default 256x256 for box, 320x180 "
+              "for room, 160x108 for generated scenes, and the hard ones' own.")
+@click.option("--frames", metavar="RANGE", default="0:10", show_default=True,
+              help="Frames of the suite.")
+@click.option("--reference-spp", type=int, default=512, show_default=True, metavar="N",
+              help="Samples a pixel of the suite's ground truth.")
+@click.option("--seed", type=int, default=2026, show_default=True, metavar="N",
+              help="Seed of the suite's frames.")
+@device_option
+@threads_option
+def lead(folders: tuple[Path, ...], method: str, peer: str, suite: bool, scenes: str, out: Path,
+         size: str | None, frames: str, reference_spp: int, seed: int, device: str,
+         threads: int | None) -> None:
+    """Print how far a method is ahead of a peer, from the scores of pairs of folders."""
+    if not suite:
+        _pairs(folders, method, peer)
+        return
+    if folders:
+        raise InputError("--suite takes no folders: it renders its own into --out")
+    use(device, threads)
+    parse_frames(frames)
+    _suite(method, _pattern(scenes), out, size, frames, reference_spp, seed)
+
+
+def _pairs(folders: tuple[Path, ...], method: str, peer: str) -> None:
+    from onespp.denoise.score.scorecard import read_scores
+    from onespp.denoise.studies.lead import markdown, peer_in, psnr_of
+
+    if len(folders) % 2 or not folders:
+        raise InputError("folders come in pairs, of plain input and of ours: give "
+                         + ("one more" if folders else "some, or --suite"))
+    read = [read_scores(folder / "scores.json") for folder in folders]
+    scenes = {folder.name: (a, b) for folder, a, b in zip(folders[1::2], read[::2], read[1::2])}
+    click.echo(markdown(method, peer, scenes))
+    for name, (plain, ours) in scenes.items():
+        floor = ours.reference_floor_db
+        on_plain, on_ours = (peer_in(scores, peer, name) for scores in (plain, ours))
+        click.echo(f"\n{name}: {len(ours.frames)} frames of {ours.size[0]}x{ours.size[1]}, "
+                   f"reference {ours.reference_spp or 'of unknown'} spp, floor "
+                   + (f"{floor:.1f} dB" if floor is not None else "not known")
+                   + "".join(f"; {key} {psnr_of(s.methods[key]):.2f} dB{where}"
+                             for s, key, where in ((plain, "input", " (plain)"),
+                                                   (plain, on_plain, " (plain)"),
+                                                   (ours, "input", ""), (ours, on_ours, ""),
+                                                   (ours, method, ""))), nl=False)
+    click.echo()
+
+
+def _suite(method: str, pattern: re.Pattern[str], out: Path, size: str | None, frames: str,
+           reference_spp: int, seed: int) -> None:
+    from onespp.denoise.studies.suite import Group, groups, markdown
+    from onespp.scenes.catalog import GENERATED
+    from onespp.scenes.generated import KEPT
+    from onespp.scenes.hard import HARD
+
+    found: dict[Group, Mapping[str, Scores]] = {}
+    asked = groups([GENERATED[i] for i in KEPT], [f"hard/{name}" for name in HARD])
+    if not any(pattern.search(scene) for group in asked for scene in group.scenes):
+        raise InputError(f"no scene of the suite has '{pattern.pattern}' in its name: `onespp "
+                         "scenes` lists them")
+    for group in asked:
+        scored: dict[str, Scores] = {}
+        for scene in filter(pattern.search, group.scenes):
+            pixels = size or next((s for key, s in SIZES.items() if scene.startswith(key)), None)
+            rendered = render_to(
+                scene, out / scene, frames=frames, size=pixels, seed=seed,
+                reference_spp=reference_spp, antialias=False, channels=None, direct="resampled",
+                sampler="zsobol", overwrite=False)
+            if group.plain:
+                rendered = _plain(rendered, out / "plain" / scene)
+            scored[scene] = _scored(rendered, method, group.peers)
+        found[group] = scored
+    click.echo(markdown(method, found))
+
+
+def _scored(sequence: FrameSequence, method: str, peers: tuple[str, ...]) -> Scores:
+    """Scores of the method and its peers, after denoising by the method and by peers not yet
+    there: the method is what changes from one time to the next."""
+    from onespp.denoise.score.sequence import score
+
+    missing = [peer for peer in peers if peer == method or not all(
+        sequence.has_result(peer, i) for i in sequence.frames)]
+    denoise_in(sequence.folder, (*missing, *({method} - {*missing})))
+    with writing(sequence.folder, "score"):
+        return score(sequence, list(dict.fromkeys((method, *peers))), command=command_line())
+
+
+def _plain(sequence: FrameSequence, folder: Path) -> FrameSequence:
+    """The frames exported to the assignment's layout and imported into `folder`, with the
+    references of the original; what is there is kept."""
+    from onespp.render.games202.convert import export_games202, import_games202
+
+    there = (folder / "manifest.json").exists()
+    if not there or not all(map((kept := FrameSequence.open(folder)).has_frame, kept.frames)):
+        files = sequence.folder / "games202"
+        export_games202(sequence, files)
+        with writing(folder, "render", alone=there):
+            import_games202(files, folder, fps=sequence.manifest.fps, overwrite=there,
+                            command=command_line())
+    plain = FrameSequence.open(folder)
+    for k, i in zip(plain.frames, sequence.frames, strict=True):
+        if not plain.has_reference(k):
+            plain.write_reference(k, sequence.read_reference(i))
+    return plain.with_reference_spp()
+
+
+def _pattern(text: str) -> re.Pattern[str]:
+    try:
+        return re.compile(text)
+    except re.error as error:
+        raise InputError(f"--scenes is '{text}', which is no regular expression: {error}") from None
