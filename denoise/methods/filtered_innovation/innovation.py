@@ -34,7 +34,9 @@ ratio of sums, S[e] / S[omega], without noise of which light was picked. History
 
     h <- h + f S[e] / S[omega] + a (e - omega S[e] / S[omega]),   a = max(1 / (N + 1/2), ...),
 
-N being the sum of omega over its frames, this one included. In the last filter a pixel counts by
+N being the sum of omega over its frames, this one included. The noise of a sample is that of a
+coin, s_0^2 = v (1 - v), v = h + S[e] / S[omega], and which history is the right one is told before
+the smoothing by excess over fewer pixels (`passes.py`). In the last filter a pixel counts by
 what its history holds, min(N, 1), and one that has had no ray yet keeps what the filter found.
 
 A smoothing is a-trous levels of 3x3 taps, h = {1/4, 1/2, 1/4}^2, 2^i pixels apart. The last filter
@@ -164,6 +166,23 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
                         for shadow in shadows], sparse)
 
 
+def choose_histories(layout: SignalLayout, innovations: Innovations,
+                     excess: list[Float]) -> Innovations:
+    """With its shadow history in the place of the other one where that of a sparse signal is
+    better; excess: of each, smoothed."""
+    signals, energies = list(innovations.signals), list(innovations.energies)
+    variances, sparse = list(innovations.variances), list(innovations.sparse)
+    for g, (shadow, more) in enumerate(zip(innovations.shadows, excess, strict=True)):
+        s, better = len(layout.kinds) - layout.groups + g, more < 0
+        e = dr.select(better, shadow.innovation, signals[s].luminance)
+        signals[s], energies[s] = Signal(None, e, None), dr.minimum(dr.square(e), MAX_ENERGY)
+        variances[s] = dr.select(better, shadow.variance, variances[s])
+        sparse[g] = sparse[g]._replace(
+            history=dr.select(better, shadow.history, sparse[g].history))
+    return innovations._replace(signals=signals, energies=energies, variances=variances,
+                                sparse=sparse, shadows=[])
+
+
 def weights_of(layout: SignalLayout, chosen: Chosen | None) -> list[Float | None]:
     """omega of each signal that is sparse."""
     weights: list[Float | None] = []
@@ -177,13 +196,14 @@ def weights_of(layout: SignalLayout, chosen: Chosen | None) -> list[Float | None
 def to_smooth(layout: SignalLayout, innovations: Innovations) -> Smoothed:
     """What is smoothed of the innovation."""
     diffuse, *sharp = innovations.signals
-    weights = [sparse.weight for sparse in innovations.sparse]
+    dense = len(layout.kinds) - layout.groups
     return Smoothed(
         diffuse_spread=innovations.energies[0], diffuse=diffuse,
         excess=[shadow.excess for shadow in innovations.shadows],
         visibility_spread=[innovations.energies[s] for s in layout.visibilities], sharp=sharp,
         shadow_innovation=[shadow.innovation for shadow in innovations.shadows],
-        weights=weights, energies=innovations.energies, energy_weights=weights)
+        weights=[sparse.weight for sparse in innovations.sparse],
+        energies=innovations.energies[:dense])
 
 
 def pack_history(stencil: Stencil, layout: SignalLayout, surface: SurfaceSample, history: History,

@@ -50,10 +50,10 @@ class Smoothed(NamedTuple):
     Attributes:
         diffuse_spread: Q of diffuse light. diffuse: S[e] of it.
         excess: S of how much greater e^2 is in visibility's shadow history than in the other, of
-            each visibility that has one.
+            each visibility that has one and is not sparse.
         visibility_spread: Q of each visibility. sharp: S[e] of glossy light and of visibility.
-        shadow_innovation: S[e] of each shadow history. weights: S[omega] of each sparse signal.
-        energies: W[l(e)^2] of each signal. energy_weights: W[omega] of each sparse signal.
+        shadow_innovation: S[e] of each of those histories. weights: S[omega] of each sparse signal.
+        energies: W[l(e)^2] of each signal that is not sparse.
     """
 
     diffuse_spread: Float
@@ -64,7 +64,6 @@ class Smoothed(NamedTuple):
     shadow_innovation: list[Float]
     weights: list[Float]
     energies: list[Float]
-    energy_weights: list[Float]
 
 
 @dataclass(frozen=True)
@@ -134,18 +133,17 @@ class SignalLayout:
         diffuse, sharp = self.innovation_levels, self.sharp_innovation_levels
         light = Signal(*[rule(sharp)] * 3)
         visible = [rule(sharp, penumbra=self.follower(s)) for s in self.visibilities]
-        followed = [rule(sharp, penumbra=f) for f in range(self.followed)]
+        chosen = visible if self.has_shadow_rays and not self.groups else []
         glossy = [light] * self.kinds.count(SignalKind.GLOSSY)
         return _leaves(Smoothed(
             diffuse_spread=rule(diffuse, squared=True),
             diffuse=Signal(*[rule(diffuse)] * 3),
-            excess=[rule(max(CHOICE_LEVELS, sharp)) for _ in followed],
+            excess=[rule(max(CHOICE_LEVELS, sharp)) for _ in chosen],
             visibility_spread=[replace(one, squared=True) for one in visible],
             sharp=[*glossy, *(Signal(None, one, None) for one in visible)],
-            shadow_innovation=followed,
+            shadow_innovation=chosen,
             weights=visible[len(visible) - self.groups:],
-            energies=[rule(ENERGY_LEVELS) for _ in self.kinds],
-            energy_weights=[rule(ENERGY_LEVELS)] * self.groups))
+            energies=[rule(ENERGY_LEVELS)] * (len(self.kinds) - self.groups)))
 
     def smoothing_level(self, level: int) -> list[PlaneRule]:
         """Rules of the planes that are left at a level, the first so many."""

@@ -22,6 +22,7 @@ from .output import FEWEST_SAMPLES, fade_out
 MIN_NOISE = 0.25               # share of the innovation's energy that is at least noise of d
 _FILLED = 0.5                  # samples that what was filtered counts for
 _UNKNOWN = 0.5                 # visibility that nothing is known of
+_LEAST_NOISE = 0.01            # variance of a sample of visibility
 _MOST_SAMPLES = 64.0
 _LEAST_OMEGA = 0.1             # that a lone sample is divided by
 _MIN_ENERGY = 1e-20            # square of a luminance that is taken for 0
@@ -54,8 +55,8 @@ class Merged(NamedTuple):
 def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovations: Innovations,
           chosen: Chosen | None, smoothed: Smoothed, plane: TangentPlane, gains: Gains) -> Merged:
     """The new history, and how the last filter fades out with it."""
-    for f, shadow in enumerate(innovations.shadows):
-        innovations, smoothed = _choose_history(layout, f, innovations, shadow, smoothed)
+    if innovations.shadows:
+        innovations, smoothed = _choose_history(innovations, innovations.shadows[0], smoothed)
     is_new = innovations.length < 1.5
     omegas = weights_of(layout, chosen)
     dense = [s for s, omega in enumerate(omegas) if omega is None]
@@ -65,7 +66,7 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
     merged, sparse_fades = [], []
     for s, (kind, signal) in enumerate(zip(layout.kinds, signals, strict=True)):
         e, wide = innovations.signals[s], [smoothed.diffuse, *smoothed.sharp][s]
-        variance, energy, omega = innovations.variances[s], smoothed.energies[s], omegas[s]
+        variance, omega, samples = innovations.variances[s], omegas[s], None
         alpha, gain = gains.alphas[s], gains.sharp_min_gain
         if kind is SignalKind.DIFFUSE:
             gain = dr.maximum(_certainty(smoothed.diffuse_spread, wide, gains), gains.min_gain)
@@ -76,27 +77,25 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
         if omega is None:
             a = dr.maximum(1 / innovations.length, alpha)
             merged_signal = mapped(_merged(dr.maximum(gain, a), a), signal, e, wide)
-            samples = None
+            energy = smoothed.energies[s]
+            noise = dr.maximum(energy - variance, energy * MIN_NOISE)
         else:
             g = s - len(dense)
-            old = innovations.sparse[g]
-            a = dr.maximum(1 / (old.samples + old.weight + _FILLED), alpha)
-            norm = _norm(smoothed.weights[g])
-            followed = dr.fma(gain, norm * wide.luminance, old.history)
-            rest = dr.fma(-old.weight * norm, wide.luminance, e.luminance)
+            old, change = innovations.sparse[g], _norm(smoothed.weights[g]) * wide.luminance
+            a = dr.minimum(dr.maximum(1 / (old.samples + old.weight + _FILLED), alpha), 1)
+            v = dr.fma(gain, change, old.history)
+            v = dr.fma(a, dr.fma(-old.weight, change, e.luminance), v)
             alone = dr.select(first[g] >= 0, first[g], _UNKNOWN)
-            merged_signal = Signal(None, dr.select(
-                is_new, alone, dr.fma(dr.minimum(a, 1), rest, followed)), None)
-            energy *= _norm(smoothed.energy_weights[g])
-            samples = old.samples + omega
+            merged_signal = Signal(None, dr.select(is_new, alone, v), None)
+            mean = dr.clip(old.history + change, 0, 1)
+            noise = dr.maximum(mean * (1 - mean), _LEAST_NOISE)
+            samples = dr.minimum(old.samples + omega, _MOST_SAMPLES)
             a = dr.select(is_new, dr.select(omega > 0, type(a)(1), 0), dr.minimum(a * omega, 1))
             sparse_fades.append(fade_out(samples, gains.fade_frames))
-        noise = dr.select(is_new, spatial[s], dr.maximum(energy - variance, energy * MIN_NOISE))
+        noise = dr.select(is_new, spatial[s], noise)
         variance = dr.fma(dr.square(1 - a), variance, dr.square(a) * noise)
-        if omega is not None:
-            unknown = samples <= FEWEST_SAMPLES
-            variance = dr.select(unknown, PRIOR_VARIANCE, variance)
-            samples = dr.minimum(samples, _MOST_SAMPLES)
+        if samples is not None:
+            variance = dr.select(samples > FEWEST_SAMPLES, variance, PRIOR_VARIANCE)
         merged.append(NoisySignal(merged_signal, variance, samples))
     return Merged(merged, fade_out(innovations.length, gains.fade_frames), sparse_fades)
 
@@ -118,28 +117,21 @@ def _merged(gain: Float, a: Float) -> Callable[[Float, Float, Float], Float]:
     return lambda d, e, wide: dr.fma(gain - a, wide, dr.fma(a - 1, e, d))
 
 
-def _choose_history(layout: SignalLayout, f: int, innovations: Innovations,
-                    shadow: ShadowInnovation, smoothed: Smoothed) -> tuple[Innovations, Smoothed]:
-    """With the shadow history of a visibility in the place of the other one, where it is better."""
-    s = len(layout.kinds) - layout.followed + f
-    g, better = layout.group(s), smoothed.excess[f] < 0
-
-    def chosen(one: Float, other: Float) -> Float:
-        return dr.select(better, one, other)
-
-    signals, variances = list(innovations.signals), list(innovations.variances)
-    sharp, energies = list(smoothed.sharp), list(smoothed.energies)
-    signals[s] = signals[s]._replace(
-        luminance=chosen(shadow.innovation, signals[s].luminance))
-    sharp[s - 1] = sharp[s - 1]._replace(
-        luminance=chosen(smoothed.shadow_innovation[f], sharp[s - 1].luminance))
-    variances[s] = chosen(shadow.variance, variances[s])
-    energies[s] = dr.maximum(energies[s] + dr.minimum(smoothed.excess[f], 0), 0)
-    sparse = list(innovations.sparse)
-    if g is not None:
-        sparse[g] = sparse[g]._replace(history=chosen(shadow.history, sparse[g].history))
-    return (innovations._replace(signals=signals, variances=variances, sparse=sparse),
-            smoothed._replace(sharp=sharp, energies=energies))
+def _choose_history(innovations: Innovations, shadow: ShadowInnovation,
+                    smoothed: Smoothed) -> tuple[Innovations, Smoothed]:
+    """With the shadow history of visibility in the place of the other one, where it is better."""
+    excess, energy = smoothed.excess[0], smoothed.energies[-1]
+    better = excess < 0
+    e, wide = innovations.signals[-1], smoothed.sharp[-1]
+    e = e._replace(luminance=dr.select(better, shadow.innovation, e.luminance))
+    wide = wide._replace(luminance=dr.select(better, smoothed.shadow_innovation[0],
+                                             wide.luminance))
+    variance = dr.select(better, shadow.variance, innovations.variances[-1])
+    energy = dr.maximum(energy + dr.minimum(excess, 0), 0)
+    return (innovations._replace(signals=[*innovations.signals[:-1], e],
+                                 variances=[*innovations.variances[:-1], variance]),
+            smoothed._replace(sharp=[*smoothed.sharp[:-1], wide],
+                              energies=[*smoothed.energies[:-1], energy]))
 
 
 def _certainty(spread: Float, wide: Signal, gains: Gains) -> Float:

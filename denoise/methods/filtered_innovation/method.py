@@ -164,6 +164,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         innovations = passes.find_innovations(
             signals, chosen, sample, plane, motion, records, shadows,
             *self._reprojection_parameters(stencil))
+        innovations = passes.choose_histories(innovations, plane)
         smoothed = passes.smooth_innovations(innovations, plane)
         merged = passes.merge(signals, innovations, chosen, smoothed, plane,
                               self._gains(stencil, layout))

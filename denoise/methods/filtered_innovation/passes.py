@@ -19,7 +19,7 @@ from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import arrays_of, build, flatten
 from onespp.denoise.jit.taps import Taps, window
 
-from .innovation import Innovations, find_innovations, pack_history, to_smooth
+from .innovation import Innovations, choose_histories, find_innovations, pack_history, to_smooth
 from .layout import NoisySignal, PlaneRule, SignalLayout, Smoothed
 from .merging import Merged, merge
 from .output import FEWEST_SAMPLES, OutputFalloff, output_level
@@ -72,6 +72,8 @@ class Passes:
     follow_shadows: Step[..., list[Shadows]]
     spread: list[Level]
     find_innovations: Step[..., Innovations]
+    choice: list[Level]
+    choose: Step[..., Innovations]
     smoothing: list[Level]
     merge: Step[..., Merged]
     output: list[Level]
@@ -100,6 +102,10 @@ class Passes:
                         lambda *a: smooth_level(spread, *a))
              for i in (_SPARSE_SPREAD if layout.groups else (SPREAD_LEVEL,))],
             Step(lambda *a: find_innovations(stencil, layout, *a)),
+            [Level.make(i, buffer, layout.groups, surfaces, _VALID_INVERSE_DEPTH,
+                        lambda *a: smooth_level(spread[:layout.groups], *a))
+             for i in _SPARSE_SPREAD if layout.groups and layout.has_shadow_rays],
+            Step(lambda *a: choose_histories(layout, *a)),
             [smoothing(i) for i in range(layout.innovation_levels)],
             Step(lambda *a: merge(stencil, layout, *a)),
             [output(i) for i in range(layout.output_levels)],
@@ -117,9 +123,16 @@ class Passes:
         return self._through(self.spread, self.follow_shadows(rays, surface, position, group),
                              plane)
 
+    def choose_histories(self, innovations: Innovations, plane: TangentPlane) -> Innovations:
+        """With the better one of the two histories of each sparse signal; first of what follows."""
+        self.surfaces.store(innovations.valid_inverse_depth, first=_VALID_INVERSE_DEPTH)
+        if not self.choice:
+            return innovations
+        excess = [shadow.excess for shadow in innovations.shadows]
+        return self.choose(innovations, self._through(self.choice, excess, plane))
+
     def smooth_innovations(self, innovations: Innovations, plane: TangentPlane) -> Smoothed:
         """Q, S and W of the innovation, over pixels that have a history."""
-        self.surfaces.store(innovations.valid_inverse_depth, first=_VALID_INVERSE_DEPTH)
         return self._through(self.smoothing, to_smooth(self.layout, innovations), plane,
                              innovations.footprint_falloffs)
 
