@@ -236,9 +236,8 @@ def shadow_shift(previous: Frame, frame: Frame, told: np.ndarray) -> np.ndarray:
 
 
 def spread_out(frame: Frame, image: np.ndarray, m) -> np.ndarray:
-    """Means of what shadow rays tell, from farther around where one tells of one group alone."""
-    levels = (2, 1) if "group" in frame else (1, 2)
-    return smooth(frame, image, np.ones(frame["id"].shape), levels[0], m, first=levels[1])
+    """Means of what shadow rays tell, from a few pixels around."""
+    return smooth(frame, image, np.ones(frame["id"].shape), 1, m, first=2)
 
 
 def shadow_history(previous: Frame, frame: Frame, told: np.ndarray, image: np.ndarray, m) -> tuple:
@@ -333,15 +332,18 @@ def run(frames: list[Frame], m) -> np.ndarray:
                     there = both[..., :-1]
                     other = np.where(moves[..., None], d - omega[..., None] * there, e)
                     levels_ = min(max(5, m.sharp_innovation_levels), m.innovation_levels)
-                    excess = smooth(frame, other**2 - e**2, found, levels_, m)
+                    excess = (smooth(frame, other**2 - e**2, found, 1, m, first=2) if sparse else
+                              smooth(frame, other**2 - e**2, found, levels_, m))
                     better = excess[..., 0] < 0
                     wide = np.where(excess < 0, smooth(frame, other, found, smoothing, m,
                                                        narrow=narrow), wide)
                     e = np.where(excess < 0, other, e)
+                    if sparse:  # chosen before the smoothing
+                        wide = smooth(frame, e, found, smoothing, m, narrow=narrow)
+                        q = spread(frame, lum(e) ** 2, found, smoothing, m, narrow)
                     s2 = np.where(better & moves, both[..., -1], s2)
                     h = np.where((better & moves)[..., None], there, h)
                     energy = np.maximum(energy + np.minimum(excess[..., 0], 0), 0)
-                energy = energy * norm_of(frame, here, found, 2, m) if sparse else energy
                 noise = np.where(found, np.maximum(energy - s2, energy / 4), noise)
             a, follow = np.maximum(1 / n, alpha), np.maximum(m.sharp_min_gain, alpha)
             if sparse:
@@ -352,6 +354,8 @@ def run(frames: list[Frame], m) -> np.ndarray:
                 a = a if name == "L" else np.maximum(a, m.change_alpha * certain)
             if sparse:
                 norm = norm_of(frame, here, found, smoothing, m, narrow)[..., None]
+                mean = np.clip(h + norm * wide, 0, 1)[..., 0]
+                noise = np.where(found, np.maximum(mean * (1 - mean), 0.01), noise)
                 rest = e - here[..., None] * norm * wide
                 history = h + follow[..., None] * norm * wide + np.minimum(a, 1)[..., None] * rest
                 history = np.where(found[..., None], history, np.where(omega[..., None] > 0,

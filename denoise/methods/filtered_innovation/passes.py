@@ -29,7 +29,6 @@ from .smoothing import smooth_level
 _OUTSIDE = -1e15          # 1/z outside the image
 _ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH = range(3)  # planes of the surface
 _SHADOW_PLANES = 5        # of `Shadows`
-_SPARSE_SPREAD = (SPREAD_LEVEL - 1, SPREAD_LEVEL)  # levels, where few rays tell of each light
 T = TypeVar("T")
 
 
@@ -70,9 +69,9 @@ class Passes:
     surfaces: Planes
     buffer: Planes
     follow_shadows: Step[..., list[Shadows]]
-    spread: list[Level]
+    spread: Level
     find_innovations: Step[..., Innovations]
-    choice: list[Level]
+    choice: Level | None
     choose: Step[..., Innovations]
     smoothing: list[Level]
     merge: Step[..., Merged]
@@ -98,13 +97,12 @@ class Passes:
         return Passes(
             stencil, layout, surfaces, buffer,
             Step(lambda *a: follow_shadows(stencil, *a, layout.groups)),
-            [Level.make(i, buffer, len(spread), surfaces, _INVERSE_DEPTH,
-                        lambda *a: smooth_level(spread, *a))
-             for i in (_SPARSE_SPREAD if layout.groups else (SPREAD_LEVEL,))],
+            Level.make(SPREAD_LEVEL, buffer, len(spread), surfaces, _INVERSE_DEPTH,
+                       lambda *a: smooth_level(spread, *a)),
             Step(lambda *a: find_innovations(stencil, layout, *a)),
-            [Level.make(i, buffer, layout.groups, surfaces, _VALID_INVERSE_DEPTH,
-                        lambda *a: smooth_level(spread[:layout.groups], *a))
-             for i in _SPARSE_SPREAD if layout.groups and layout.has_shadow_rays],
+            Level.make(SPREAD_LEVEL, buffer, layout.groups, surfaces, _VALID_INVERSE_DEPTH,
+                       lambda *a: smooth_level(spread[:layout.groups], *a))
+            if layout.groups and layout.has_shadow_rays else None,
             Step(lambda *a: choose_histories(layout, *a)),
             [smoothing(i) for i in range(layout.innovation_levels)],
             Step(lambda *a: merge(stencil, layout, *a)),
@@ -120,16 +118,16 @@ class Passes:
         if rays is None:
             return []
         group = chosen.group if chosen else None
-        return self._through(self.spread, self.follow_shadows(rays, surface, position, group),
+        return self._through([self.spread], self.follow_shadows(rays, surface, position, group),
                              plane)
 
     def choose_histories(self, innovations: Innovations, plane: TangentPlane) -> Innovations:
         """With the better one of the two histories of each sparse signal; first of what follows."""
         self.surfaces.store(innovations.valid_inverse_depth, first=_VALID_INVERSE_DEPTH)
-        if not self.choice:
+        if self.choice is None:
             return innovations
         excess = [shadow.excess for shadow in innovations.shadows]
-        return self.choose(innovations, self._through(self.choice, excess, plane))
+        return self.choose(innovations, self._through([self.choice], excess, plane))
 
     def smooth_innovations(self, innovations: Innovations, plane: TangentPlane) -> Smoothed:
         """Q, S and W of the innovation, over pixels that have a history."""

@@ -198,7 +198,7 @@ def test_five_frames_are_one_recording_and_parameters_compile_nothing():
     _, state = run(FilteredInnovation(), frames)
     passes = state.passes
     steps = [passes.follow_shadows, passes.find_innovations, passes.merge, passes.pack,
-             *(level.step for level in (*passes.spread, *passes.smoothing, *passes.output))]
+             *(level.step for level in (passes.spread, *passes.smoothing, *passes.output))]
     assert [step.recordings for step in steps] == [1] * len(steps)
 
 
