@@ -334,6 +334,7 @@ def run(frames: list[Frame], m) -> np.ndarray:
                     levels_ = min(max(5, m.sharp_innovation_levels), m.innovation_levels)
                     excess = (smooth(frame, other**2 - e**2, found, 1, m, first=2) if sparse else
                               smooth(frame, other**2 - e**2, found, levels_, m))
+                    excess = excess + 1e-6 if sparse else excess
                     better = excess[..., 0] < 0
                     wide = np.where(excess < 0, smooth(frame, other, found, smoothing, m,
                                                        narrow=narrow), wide)

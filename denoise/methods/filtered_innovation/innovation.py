@@ -76,6 +76,7 @@ from .noise import MAX_ENERGY
 from .output import FEWEST_SAMPLES
 from .shadows import Shadows
 
+_TIE = 1e-6                    # excess of a history that is no better nor worse
 _NO_HISTORY = -3e14            # 1/z of a pixel without history
 
 
@@ -173,7 +174,7 @@ def choose_histories(layout: SignalLayout, innovations: Innovations,
     signals, energies = list(innovations.signals), list(innovations.energies)
     variances, sparse = list(innovations.variances), list(innovations.sparse)
     for g, (shadow, more) in enumerate(zip(innovations.shadows, excess, strict=True)):
-        s, better = len(layout.kinds) - layout.groups + g, more < 0
+        s, better = len(layout.kinds) - layout.groups + g, more < -_TIE
         e = dr.select(better, shadow.innovation, signals[s].luminance)
         signals[s], energies[s] = Signal(None, e, None), dr.minimum(dr.square(e), MAX_ENERGY)
         variances[s] = dr.select(better, shadow.variance, variances[s])
