@@ -203,7 +203,7 @@ def look_up(previous: Frame, frame: Frame, image: np.ndarray, m) -> tuple:
     return np.where(found[..., None], history, 0), found
 
 
-def shadow_shift(previous: Frame, frame: Frame, told: np.ndarray) -> np.ndarray:
+def shadow_shift(previous: Frame, frame: Frame, told: np.ndarray | None = None) -> np.ndarray:
     """(h, w, 2) pixels by which each pixel's shadow was elsewhere; NaN if it was not, or was not
     told of.
 
@@ -211,6 +211,7 @@ def shadow_shift(previous: Frame, frame: Frame, told: np.ndarray) -> np.ndarray:
     """
     h, w = frame["id"].shape
     shift = np.full((h, w, 2), np.nan)
+    told = (frame["id"] >= 0) if told is None else told & (frame["id"] >= 0)
 
     def seen(surface: Any, object_: Any, point: np.ndarray) -> np.ndarray:
         """Where a point of an object was in the frame before, as the surface saw it."""
@@ -221,7 +222,7 @@ def shadow_shift(previous: Frame, frame: Frame, told: np.ndarray) -> np.ndarray:
                 motion = (m if back else np.linalg.inv(m)) @ motion
         return (motion @ [*point, 1])[:3]
 
-    for y, x in np.argwhere(told & (frame["id"] >= 0) & (frame["blocker_distance"] > 0)):
+    for y, x in np.argwhere(told & (frame["blocker_distance"] > 0)):
         i, position = frame["id"][y, x], frame["position"][y, x].astype(float)
         n, light = frame["normal"][y, x].astype(float), frame["light"][y, x].astype(float)
         share = frame["blocker_distance"][y, x] / np.linalg.norm(light)

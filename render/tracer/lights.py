@@ -37,6 +37,7 @@ Source: resampled importance sampling (Talbot et al. 2005) with the ratio estima
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 
@@ -93,8 +94,12 @@ class DirectLight:
 
 @dr.syntax
 def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
-                    active: mi.Bool, groups: LightGroups | None = None) -> DirectLight:
-    """Direct light toward `si.wi` from light sampling, one shadow ray a lane."""
+                    active: mi.Bool, groups: Any = None) -> DirectLight:
+    """Direct light toward `si.wi` from light sampling, one shadow ray a lane.
+
+    Args:
+        groups: `LightGroups`, None where all lights are one.
+    """
     emitters = len(scene.emitters())
     strata = GRID * GRID * emitters
     choice, jitter = sampler.next_1d(), sampler.next_2d()

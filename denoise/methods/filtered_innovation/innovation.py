@@ -141,6 +141,7 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
         if omega is None:
             e.append(mapped(lambda d, h: dr.select(is_valid, d - h, 0), signal, old.signal))
             continue
+        assert old.samples is not None
         h = old.signal.luminance
         e.append(Signal(None, dr.select(is_valid, dr.fma(-omega, h, signal.luminance), 0), None))
         sparse.append(SparseHistory(dr.select(is_valid, omega, 0), h,

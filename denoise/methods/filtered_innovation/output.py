@@ -47,17 +47,19 @@ def output_level(layout: SignalLayout, level: int, values: Taps[list[NoisySignal
     rules = [_Rule.of(layout, s, level, falloff, spacing) for s in left]
     sums = [_start(c, h0) for c in center]
     scales = [sigma / (dr.sqrt(c.variance) + EPSILON) for c, sigma in zip(center, sigmas)]
-    totals = [type(plane.dx)(h0) if c.samples is None else h0 * c.samples for c in center]
+    totals: list[Float] = [type(plane.dx)(h0) if c.samples is None else h0 * c.samples
+                           for c in center]
     for i, offset in enumerate(window(1)):
         taps, surface_x = values.at(i), exponent(i, offset)
         for s, tap in zip(left, taps, strict=True):
             distance = (tap.signal.luminance - center[s].signal.luminance) * scales[s]
             x = rules[s].nearer(dr.fma(distance, -distance, surface_x), offset)
-            w = exp2(x if rules[s].fade is None else x + rules[s].fade)
-            samples = None
-            if tap.samples is not None:
-                samples, w = sums[s].samples + w, w * tap.samples
-            totals[s] += w
+            fade = rules[s].fade
+            w = exp2(x if fade is None else x + fade)
+            samples = sums[s].samples
+            if samples is not None and tap.samples is not None:
+                samples, w = samples + w, w * tap.samples
+            totals[s] = totals[s] + w
             sums[s] = NoisySignal(mapped(_weighted(w), tap.signal, sums[s].signal),
                                   dr.fma(w * w, tap.variance, sums[s].variance), samples)
         values.next()

@@ -23,7 +23,7 @@ from .innovation import Innovations, choose_histories, find_innovations, pack_hi
 from .layout import NoisySignal, PlaneRule, SignalLayout, Smoothed
 from .merging import Merged, merge
 from .output import FEWEST_SAMPLES, OutputFalloff, output_level
-from .shadows import Shadows, follow_shadows
+from .shadows import Shadows, follow_shadows, of_each_light
 from .smoothing import smooth_level
 
 _OUTSIDE = -1e15          # 1/z outside the image
@@ -96,7 +96,8 @@ class Passes:
 
         return Passes(
             stencil, layout, surfaces, buffer,
-            Step(lambda *a: follow_shadows(stencil, *a, layout.groups)),
+            Step(lambda chosen, *a: of_each_light(follow_shadows(stencil, *a), chosen,
+                                                  layout.groups)),
             Level.make(SPREAD_LEVEL, buffer, len(spread), surfaces, _INVERSE_DEPTH,
                        lambda *a: smooth_level(spread, *a)),
             Step(lambda *a: find_innovations(stencil, layout, *a)),
@@ -114,11 +115,10 @@ class Passes:
 
     def spread_shadows(self, rays: ShadowRays | None, surface: SurfaceSample, position: Vector3,
                        plane: TangentPlane, chosen: Chosen | None) -> list[Shadows]:
-        """`follow_shadows`, and means of it over a few pixels around."""
+        """`follow_shadows` of each light, and means of it over a few pixels around."""
         if rays is None:
             return []
-        group = chosen.group if chosen else None
-        return self._through([self.spread], self.follow_shadows(rays, surface, position, group),
+        return self._through([self.spread], self.follow_shadows(chosen, rays, surface, position),
                              plane)
 
     def choose_histories(self, innovations: Innovations, plane: TangentPlane) -> Innovations:

@@ -10,8 +10,9 @@ import drjit as dr
 from onespp.denoise.filters.penumbra import PenumbraSample, penumbra_samples
 from onespp.denoise.history.shadow_motion import ShadowMotion, shadow_motion
 from onespp.denoise.inputs.shadow_rays import ShadowRays, stopped
+from onespp.denoise.inputs.signals import Chosen
 from onespp.denoise.inputs.surface import SurfaceSample
-from onespp.denoise.jit.arrays import Float, Vector3
+from onespp.denoise.jit.arrays import Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import mapped
 from onespp.denoise.jit.vector import dot, transform
@@ -25,16 +26,21 @@ class Shadows(NamedTuple):
 
 
 def follow_shadows(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
-                   position: Vector3, group: Float | None, groups: int) -> list[Shadows]:
-    """`shadow_motion` and `penumbra_samples` of each pixel; arguments as of the former. Of each
-    group of lights apart, where there are any; group: which one each pixel's ray went to."""
+                   position: Vector3) -> Shadows:
+    """`shadow_motion` and `penumbra_samples` of each pixel; arguments as of the former."""
     blocked, scale = stopped(rays, surface.id)
     light = transform(rays.camera_from_world, rays.ray.light)
     cosine = dr.abs(dot(surface.normal, light)) * scale
     focal = dr.abs(rays.screen_from_camera.x.x)
-    shadows = Shadows(shadow_motion(stencil, rays, surface, position),
-                      penumbra_samples(stencil, blocked, rays.ray.blocker_distance * scale, cosine,
-                                       rays.ray.light_id, surface.depth, focal, rays.light_sizes))
-    if group is None:
+    return Shadows(shadow_motion(stencil, rays, surface, position),
+                   penumbra_samples(stencil, blocked, rays.ray.blocker_distance * scale, cosine,
+                                    rays.ray.light_id, surface.depth, focal, rays.light_sizes))
+
+
+def of_each_light(shadows: Shadows, chosen: Chosen | None, groups: int) -> list[Shadows]:
+    """What rays tell of each group of lights, nothing where a ray went to another; of all lights
+    where they are one."""
+    if chosen is None:
         return [shadows]
+    group = chosen.group
     return [mapped(lambda x, g=g: dr.select(group == g, x, 0), shadows) for g in range(groups)]

@@ -33,7 +33,7 @@ def with_groups(frame, visible, seed):
     for g, unshadowed in enumerate(each[:-1]):
         part = np.where(group == g, y / np.maximum(chance, 1e-9), 0)[..., None] * unshadowed
         direct, arrived = direct + part, arrived + part @ LUMINANCE
-    whole = sum(each)
+    whole = np.sum(each, axis=0)
     possible = whole @ LUMINANCE
     images = {f"unshadowed{g}": u for g, u in enumerate(each[:-1])}
     return with_images(
@@ -118,6 +118,8 @@ def test_frames_are_one_recording():
     frames = grouped(16, 20, 5)
     _, state = run(FilteredInnovation(), frames)
     passes = state.passes
+    assert passes is not None
+    assert passes.choice is not None
     steps = [passes.follow_shadows, passes.find_innovations, passes.choose, passes.merge,
              passes.pack,
              *(level.step for level in (passes.spread, passes.choice, *passes.smoothing,
