@@ -307,6 +307,7 @@ def run(frames: list[Frame], m) -> np.ndarray:
         for name, d in signals_of(frame).items():
             alpha, smoothing, levels, sigma = settings.get(name, visible)
             sparse = name.isdigit()
+            levels = max(levels - 1, 1) if sparse else levels
             told = frame["group"] == int(name) if sparse else np.ones(found.shape, bool)
             omega = told * frame["group_sample"][..., 1].astype(float) if sparse else 1.0 * told
             follows = m.follow_shadows and "light" in frame and (

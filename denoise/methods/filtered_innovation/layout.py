@@ -85,7 +85,8 @@ class SignalLayout:
         groups: of lights, whose sparse signals are the last; 0: all lights are one.
         has_shadow_rays: visibility has a second history, and penumbras are known.
         innovation_levels, output_levels: of diffuse light, in the smoothing of the innovation and
-            in the last filter. sharp_*: those of the other signals.
+            in the last filter. sharp_*: those of the other signals; the last filter of sparse ones
+            has one level less (measured: no worse, and quicker).
     """
 
     kinds: tuple[SignalKind, ...]
@@ -151,11 +152,16 @@ class SignalLayout:
 
     def output_level(self, level: int) -> list[int]:
         """The signals that are left at a level of the last filter, the first so many."""
-        return list(range(len(self.kinds) if level < self.sharp_output_levels else 1))
+        return [s for s in range(len(self.kinds)) if level < self._output_levels(s)]
 
     def is_last_level(self, s: int, level: int) -> bool:
         """Whether the last filter of a signal ends with a level."""
-        return level == (self.sharp_output_levels if s else self.output_levels) - 1
+        return level == self._output_levels(s) - 1
+
+    def _output_levels(self, s: int) -> int:
+        if s == 0:
+            return self.output_levels
+        return max(self.sharp_output_levels - (self.group(s) is not None), 1)
 
     def output_planes(self, signals: Sequence[int]) -> int:
         """Planes of these noisy signals."""
