@@ -31,6 +31,7 @@ class Group(Enum):
     GUIDES = "what is seen, without noise"
     SPLIT = "direct light as unshadowed light and the share of it that arrives"
     SHADOW = "the shadow ray at the first hit"
+    GROUPED = "direct light by groups of lights, of scenes that have several"
     GLOSS = "reflections, of scenes that have glossy surfaces"
     REPLAY = "samples of the last frame, shaded again"
     TRUTH = "of references alone"
@@ -76,7 +77,7 @@ class Channel:
 
     @property
     def is_id(self) -> bool:
-        """Whether its values are object IDs: -1, or the index of an object."""
+        """Whether its values are indices of objects, or of groups of lights; -1 for none."""
         return self.stored is OBJECT_ID
 
     def is_half(self, half: bool) -> bool:
@@ -87,6 +88,8 @@ class Channel:
 def _rgb(layer: str) -> tuple[str, ...]:
     return tuple(f"{layer}.{c}" for c in "RGB")
 
+
+MOST_GROUPS = 4  # of lights, each with a visibility of its own
 
 _ROWS = (
     Channel("color", Group.RADIANCE, ("R", "G", "B"), FLOAT, Display.LIGHT, 0.0,
@@ -122,6 +125,16 @@ _ROWS = (
             "from the first hit to what stopped that ray, scene units; 0: nothing did (likewise)"),
     Channel("blocker_id", Group.SHADOW, ("blocker.ID",), OBJECT_ID, Display.OBJECT, -1.0,
             "object ID of what stopped it; -1: nothing (likewise)"),
+    Channel("group", Group.GROUPED, ("group.ID",), OBJECT_ID, Display.OBJECT, -1.0,
+            "group of lights that the shadow ray went to; -1: no ray (with --direct resampled and "
+            "two lights or more)"),
+    Channel("group_sample", Group.GROUPED, ("group.V", "group.W", "group.P"), FLOAT, Display.RANGE,
+            0.0,
+            "what that ray says of its group: visibility sample y, its weight (the mean of y were "
+            "nothing in the way), and the chance that the ray had to go there (likewise)"),
+    *(Channel(f"unshadowed{g}", Group.GROUPED, _rgb(f"unshadowed{g}"), FLOAT, Display.LIGHT, 0.0,
+              f"part of `unshadowed` that light sampling finds in group {g} (likewise)")
+      for g in range(MOST_GROUPS)),
     Channel("specular", Group.GLOSS, _rgb("specular"), FLOAT, Display.LIGHT, 0.0,
             "part of `indirect` whose first direction a glossy or mirror lobe chose"),
     Channel("hit_distance", Group.GLOSS, ("hit.Z",), FLOAT, Display.RANGE, 0.0,
@@ -161,8 +174,9 @@ def channels_of(*groups: Group) -> tuple[str, ...]:
     return tuple(row.name for group in groups for row in _ROWS if row.group is group)
 
 
-RADIANCE, SPLIT, SHADOW, GLOSS, REPLAY = (channels_of(group) for group in (
-    Group.RADIANCE, Group.SPLIT, Group.SHADOW, Group.GLOSS, Group.REPLAY))
+RADIANCE, SPLIT, SHADOW, GROUPED, GLOSS, REPLAY = (channels_of(group) for group in (
+    Group.RADIANCE, Group.SPLIT, Group.SHADOW, Group.GROUPED, Group.GLOSS, Group.REPLAY))
+UNSHADOWED = tuple(name for name in GROUPED if name.startswith("unshadowed"))
 FRAME = channels_of(Group.RADIANCE, Group.GUIDES)
 """What can be said of every scene."""
 OFFERED = channels_of(*(group for group in Group if group is not Group.TRUTH))

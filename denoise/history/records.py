@@ -1,7 +1,7 @@
 """Several values a pixel carried from frame to frame, with SVGF's fallback.
 
 A record is a pixel of the previous frame: object ID and sign of n_z, n_x, n_y, depth, then up to
-12 values.
+12 values, or 28.
 Symbols and tests are those of `reprojection.py`. Bilinear taps that pass are weighed and
 renormalised; with less than `LEAST_WEIGHT` of them, the plain mean of those that pass among the
 3x3 pixels around (Schied et al. 2017, section 4.2); else there is no history.
@@ -28,15 +28,20 @@ from .reprojection import LEAST_WEIGHT, Place
 
 PassesT = TypeVar("PassesT")
 
-WORDS = 16          # floats in a record, one cache line
-MOST_VALUES = 12
-_HEAD = WORDS - MOST_VALUES
+WORDS = 16          # floats in a record, one cache line; or two
+_HEAD = 4
+MOST_VALUES = 2 * WORDS - _HEAD
 _NOBODY = -2.0      # ID of an empty record
 
 
-def no_history(stencil: Stencil) -> Float:
-    """Records that no pixel finds."""
-    return dr.opaque(stencil.Float, _NOBODY, stencil.lanes * WORDS)
+def record_words(values: int) -> int:
+    """Floats in a record of so many values."""
+    return WORDS if _HEAD + values <= WORDS else 2 * WORDS
+
+
+def no_history(stencil: Stencil, values: int = 0) -> Float:
+    """Records of so many values that no pixel finds."""
+    return dr.opaque(stencil.Float, _NOBODY, stencil.lanes * record_words(values))
 
 
 def pack_records(stencil: Stencil, surface: SurfaceSample, values: Any) -> Float:
@@ -47,7 +52,7 @@ def pack_records(stencil: Stencil, surface: SurfaceSample, values: Any) -> Float
     n = surface.normal
     words = [stencil.Float(surface.id) + dr.select(n.z < 0, stencil.Float(0.5), 0), n.x, n.y,
              surface.depth, *arrays]
-    words += [stencil.Float(0)] * (WORDS - len(words))
+    words += [stencil.Float(0)] * (record_words(len(arrays)) - len(words))
     return stencil.pack(words)
 
 
@@ -69,12 +74,13 @@ class LookUp(NamedTuple):
 
 
 def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosine: Float,
-            fallback: bool = False, active: Bool | None = None) -> LookUp:
+            fallback: bool = False, active: Bool | None = None, words: int = WORDS) -> LookUp:
     """The first `count` values of the previous frame's records where each pixel's surface was.
 
     Args:
         fallback: take the mean around, see the module's header.
         active: mask of the pixels that ask, if they are few; the others get no history.
+        words: of a record, see `record_words`.
     Returns:
         values that are 0 where there is no history.
     """
@@ -85,8 +91,8 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
         on_screen = ((column >= 0) & (column < stencil.width)
                      & (row >= 0) & (row < stencil.height))
         lane = dr.select(on_screen, row * stencil.stride + column, 0)
-        words = stencil.unpack(records, lane, WORDS, _HEAD + count)
-        head, nx, ny, depth = words[:_HEAD]
+        record = stencil.unpack(records, lane, words, _HEAD + count)
+        head, nx, ny, depth = record[:_HEAD]
         id_ = dr.floor(head)
         nz = dr.sqrt(dr.maximum(dr.fma(-nx, nx, dr.fma(-ny, ny, 1)), 0))
         normal = Vector3(nx, ny, dr.select(head == id_, nz, -nz))
@@ -94,7 +100,7 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
         near = dr.abs(dr.fma(depth, dot(place.plane, center), -place.offset)) < place.nearness
         turned = dot(place.normal, normal) > min_cosine
         passes = on_screen & (id_ == place.id) & (place.rough | (near & turned))
-        return words[_HEAD:], passes
+        return record[_HEAD:], passes
 
     left, top = dr.floor(place.x - 0.5), dr.floor(place.y - 0.5)
     fx, fy = place.x - 0.5 - left, place.y - 0.5 - top

@@ -32,7 +32,7 @@ from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.masked import weighted_sums
 from onespp.denoise.jit.vector import dot, transform
 
-from .records import look_up
+from .records import WORDS, look_up
 from .reprojection import Motion, ReprojectionTests, ScreenShift, locate
 
 SPREAD_LEVEL = 2  # of the smoothing by which motion spreads
@@ -106,10 +106,12 @@ def _moved(matrix: list[Float], point: Vector3) -> Vector3:
 
 
 def look_up_shadow(stencil: Stencil, surface: SurfaceSample, plane: TangentPlane, motion: Motion,
-                   records: Float, shadow: ShadowMotion, tests: ReprojectionTests) -> ShadowHistory:
-    """The first two values of the records where each pixel's shadow was.
+                   records: Float, shadow: ShadowMotion, tests: ReprojectionTests, at: int = 0,
+                   words: int = WORDS) -> ShadowHistory:
+    """Two values of the records where each pixel's shadow was.
 
     Args:
+        at: which. words: of a record.
         plane: of the surface. motion: of `motion_between`. shadow: of `shadow_motion`, smoothed.
     """
     moves = shadow.moves > MIN_SHARE
@@ -119,6 +121,6 @@ def look_up_shadow(stencil: Stencil, surface: SurfaceSample, plane: TangentPlane
     moves &= inverse_depth > 0
     there = surface._replace(depth=dr.select(moves, 1 / inverse_depth, surface.depth))
     place = locate(stencil, there, motion, tests.plane_tolerance, shift)
-    (visibility, variance), is_valid = look_up(stencil, place, records, 2, tests.min_cosine,
-                                               active=moves)
-    return ShadowHistory(visibility, variance, moves & is_valid)
+    values, is_valid = look_up(stencil, place, records, at + 2, tests.min_cosine, active=moves,
+                               words=words)
+    return ShadowHistory(values[at], values[at + 1], moves & is_valid)

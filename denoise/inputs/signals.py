@@ -10,6 +10,14 @@ cannot blur them. V is capped at `LARGEST_VISIBILITY`; what is above, what U lac
 mirror's image of a lamp) and the colour that one V for all lights misses are left in L, so that
 nothing is lost. G is the image of something else: the surface's albedo is not in it.
 
+Where several lights meet, V is noise of which of them the shadow ray went to. Frames of such a
+scene have groups of lights g, and several signals V_g: each is known where the ray went to its
+group. What the BSDF's sample finds, B = U - sum U_g unshadowed, has a V_b, known everywhere. With
+y, omega and P of `lights.py`,
+
+    colour = E + V_b B + sum V_g U_g + a L + G     V_b = (l(U) V - y l(U_g) / P) / l(B)
+    L = (I - G + D - V_b B - y U_g / P) / a        sum over pixels of y = that of omega V_g.
+
 A frame that lacks the split has D in L; one without direct light, its colour.
 """
 
@@ -27,13 +35,15 @@ from onespp.denoise.jit.arrays import Color, Float
 from onespp.denoise.jit.color import LuminanceColor, luminance, with_green
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import arrays_of
+from onespp.render.channels import GROUPED, UNSHADOWED
 from onespp.render.frame import Frame
 
 from .demodulation import Texture, read_texture
 from .repair import repair
 
-USED = ("direct", "indirect", "unshadowed", "visibility", "specular")
+USED = ("direct", "indirect", "unshadowed", "visibility", "specular", *GROUPED)
 LARGEST_VISIBILITY = 2.0
+_LEAST_SHARE = 1e-5  # of U, below which B is a rounding
 
 
 class SignalKind(Enum):
@@ -52,37 +62,48 @@ class Signal(NamedTuple):
     blue: Float | None
 
 
+class Chosen(NamedTuple):
+    """Of the groups of lights, which follow one another as the last signals.
+
+    Attributes:
+        group: of each pixel's shadow ray, -1 for none. weight: omega.
+    """
+
+    group: Float
+    weight: Float
+
+
 @dataclass(frozen=True)
 class Signals:
     """Arrays of lanes, traced and not yet evaluated.
 
     Attributes:
-        by_kind: L, then G and V where they are apart.
-        unshadowed: U, where V is apart. texture: albedo and emission.
+        kinds: of signals: L, then G and V where they are apart. listed: the signals. That of a
+            group's visibility is y, 0 where the ray went to another group.
+        unshadowed: what each V is a share of. texture: albedo and emission.
+        chosen: None where all lights are one.
     """
 
-    by_kind: dict[SignalKind, Signal]
-    unshadowed: Color | None
+    kinds: tuple[SignalKind, ...]
+    listed: list[Signal]
+    unshadowed: list[Color]
     texture: Texture
+    chosen: Chosen | None = None
 
     @property
-    def kinds(self) -> tuple[SignalKind, ...]:
-        return tuple(self.by_kind)
-
-    @property
-    def listed(self) -> list[Signal]:
-        return list(self.by_kind.values())
+    def groups(self) -> int:
+        """How many groups of lights there are, 0 where all lights are one."""
+        return len(self.unshadowed) - 1 if self.chosen else 0
 
     def color(self, signals: Sequence[Signal]) -> Color:
         """The colour that (filtered) signals make, in the order of `listed`."""
-        by_kind = dict(zip(self.by_kind, signals, strict=True))
-        color = self.texture.modulate(_color(by_kind[SignalKind.DIFFUSE]))
-        if SignalKind.GLOSSY in by_kind:
-            glossy = _color(by_kind[SignalKind.GLOSSY])
-            color = Color(*[c + g for c, g in zip(color, glossy)])
-        if self.unshadowed:
-            visibility = by_kind[SignalKind.VISIBILITY].luminance
-            color = Color(*[dr.fma(visibility, u, c) for u, c in zip(self.unshadowed, color)])
+        color = self.texture.modulate(_color(signals[0]))
+        unshadowed = iter(self.unshadowed)
+        for kind, signal in zip(self.kinds[1:], signals[1:], strict=True):
+            if kind is SignalKind.GLOSSY:
+                color = Color(*[c + g for c, g in zip(color, _color(signal))])
+            else:
+                color = _with(color, signal.luminance, next(unshadowed))
         return color
 
 
@@ -96,7 +117,7 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
     """
     texture = read_texture(frame, stencil, demodulate)
     if "direct" not in frame or "indirect" not in frame:
-        return Signals({SignalKind.DIFFUSE: _of_light(texture.demodulate(color))}, None, texture)
+        return Signals((SignalKind.DIFFUSE,), [_of_light(texture.demodulate(color))], [], texture)
 
     def load(name: str) -> list[Float]:
         image = np.asarray(frame[name], np.float32)
@@ -106,20 +127,56 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
     if "emission" in frame and not texture.emission:
         texture = Texture(texture.albedo, Color(*load("emission")), texture.zero_albedo)
     light = Color(*[d + i for d, i in zip(load("direct"), load("indirect"))])
-    apart: dict[SignalKind, Signal] = {}
-    unshadowed = None
+    kinds, apart, unshadowed, chosen = [SignalKind.DIFFUSE], [], [], None
     if gloss and "specular" in frame:
         specular = Color(*load("specular"))
         light = Color(*[c - g for c, g in zip(light, specular)])
-        apart[SignalKind.GLOSSY] = _of_light(specular)
+        kinds.append(SignalKind.GLOSSY)
+        apart.append(_of_light(specular))
     if "unshadowed" in frame and "visibility" in frame:
-        unshadowed = Color(*load("unshadowed"))
-        (v,) = load("visibility")
-        v = dr.select(v < LARGEST_VISIBILITY, v, LARGEST_VISIBILITY)
-        light = Color(*[dr.fma(-v, u, c) for u, c in zip(unshadowed, light)])
-        apart[SignalKind.VISIBILITY] = Signal(None, v, None)
+        unshadowed = [Color(*load("unshadowed"))]
+        visibility = load("visibility")
+        if "group" in frame and "group_sample" in frame:
+            unshadowed += [Color(*load(name)) for name in UNSHADOWED if name in frame]
+            group, (y, weight, chance) = *load("group"), load("group_sample")
+            visibility, unshadowed[0], light, y = _tell_apart(visibility[0], unshadowed, light,
+                                                              group, y, chance)
+            chosen = Chosen(group, dr.select(group >= 0, weight, 0))
+            visibility += [dr.select(group == g, y, 0) for g in range(len(unshadowed) - 1)]
+        visibility[0] = dr.select(visibility[0] < LARGEST_VISIBILITY, visibility[0],
+                                  LARGEST_VISIBILITY)
+        light = _with(light, -visibility[0], unshadowed[0])
+        kinds += [SignalKind.VISIBILITY] * len(visibility)
+        apart += [Signal(None, v, None) for v in visibility]
     diffuse = _of_light(Texture(texture.albedo).demodulate(light))
-    return Signals({SignalKind.DIFFUSE: diffuse, **apart}, unshadowed, texture)
+    return Signals(tuple(kinds), [diffuse, *apart], unshadowed, texture, chosen)
+
+
+def _tell_apart(visibility: Float, unshadowed: list[Color], light: Color, group: Float, y: Float,
+                chance: Float) -> tuple[list[Float], Color, Color, Float]:
+    """V_b, B, the light without what y tells of, and y, capped.
+
+    Args:
+        unshadowed: U, and U_g of each group. light: all but emission and what gloss reflects.
+    """
+    rest, here = unshadowed[0], Color(*[0 * c for c in light])
+    for g, u in enumerate(unshadowed[1:]):
+        here = Color(*[dr.select(group == g, c, h) for c, h in zip(u, here)])
+        rest = Color(*[c - r for c, r in zip(rest, u)])
+    rest = Color(*[dr.maximum(c, 0) for c in rest])
+    scale = dr.select(chance > 0, 1 / dr.select(chance > 0, chance, 1), 0)
+    found = visibility * luminance(unshadowed[0]) - y * scale * luminance(here)
+    possible = luminance(rest)
+    is_some = possible > _LEAST_SHARE * luminance(unshadowed[0])
+    v = dr.select(is_some, dr.maximum(found, 0) / dr.select(is_some, possible, 1), 1)
+    y = dr.select(y < LARGEST_VISIBILITY, y, LARGEST_VISIBILITY)
+    rest = Color(*[dr.select(is_some, c, 0) for c in rest])
+    return [v], rest, _with(light, -y * scale, here), y
+
+
+def _with(color: Color, visibility: Float, unshadowed: Color) -> Color:
+    """A colour and a share of unshadowed light."""
+    return Color(*[dr.fma(visibility, u, c) for u, c in zip(unshadowed, color)])
 
 
 def _of_light(light: Color) -> Signal:

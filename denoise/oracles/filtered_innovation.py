@@ -25,19 +25,41 @@ def texture_of(frame: Frame) -> np.ndarray:
     return albedo
 
 
+def unshadowed_of(frame: Frame) -> dict[str, np.ndarray]:
+    """U of each visibility: of V or, where lights are in groups, of what the BSDF's sample finds,
+    also V, and of each group, by its number."""
+    whole = frame["unshadowed"].astype(float)
+    groups = {name[10:]: frame[name].astype(float) for name in sorted(frame.images)
+              if name.startswith("unshadowed") and name != "unshadowed"}
+    rest = np.maximum(whole - sum(groups.values()), 0) if groups else whole
+    some = lum(rest) > (1e-5 * lum(whole) if groups else -1)
+    return {"V": np.where(some[..., None], rest, 0), **groups}
+
+
 def signals_of(frame: Frame) -> dict[str, np.ndarray]:
-    """L, G and V, (h, w, c)."""
-    albedo = texture_of(frame)
-    v = np.minimum(frame["visibility"][..., None].astype(float), 2)
-    rest = (frame["direct"].astype(float) + frame["indirect"] - frame["specular"]
-            - v * frame["unshadowed"])
-    return {"L": rest / albedo, "G": frame["specular"].astype(float), "V": v}
+    """L, G and V, (h, w, c), then y of each group."""
+    light = frame["direct"].astype(float) + frame["indirect"] - frame["specular"]
+    unshadowed = unshadowed_of(frame)
+    v, told = frame["visibility"].astype(float), {}
+    if "group" in frame:
+        y, _, chance = np.moveaxis(frame["group_sample"].astype(float), -1, 0)
+        chance = np.where(chance > 0, chance, np.inf)
+        whole, rest = lum(frame["unshadowed"].astype(float)), lum(unshadowed["V"])
+        found = v * whole
+        for g in unshadowed.keys() - {"V"}:
+            here = frame["group"] == int(g)
+            told[g] = np.where(here, np.minimum(y, 2), 0)[..., None]
+            found = found - np.where(here, y / chance * lum(unshadowed[g]), 0)
+            light = light - told[g] / chance[..., None] * unshadowed[g]
+        v = np.where(rest > 0, np.maximum(found, 0) / np.where(rest > 0, rest, 1), 1)
+    v = np.minimum(v, 2)[..., None]
+    return {"L": (light - v * unshadowed["V"]) / texture_of(frame),
+            "G": frame["specular"].astype(float), "V": v, **dict(sorted(told.items()))}
 
 
 def color_of(frame: Frame, signals: dict[str, np.ndarray]) -> np.ndarray:
-    albedo = texture_of(frame)
-    return (frame["emission"] + signals["V"] * frame["unshadowed"] + albedo * signals["L"]
-            + signals["G"])
+    direct = sum(signals[name] * u for name, u in unshadowed_of(frame).items())
+    return frame["emission"] + direct + texture_of(frame) * signals["L"] + signals["G"]
 
 
 def kind_of(frame: Frame) -> np.ndarray:
@@ -98,13 +120,16 @@ def spread(frame: Frame, energy: np.ndarray, counts: np.ndarray, levels: int, m,
 
 
 def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, sigma: float,
-           fade: np.ndarray, narrow: np.ndarray, m) -> np.ndarray:
-    """The last filter; its last level's taps are weaker by `fade`, all by exp(-narrow r^2)."""
+           fade: np.ndarray, narrow: np.ndarray, m, counts: np.ndarray | None = None) -> np.ndarray:
+    """The last filter; its last level's taps are weaker by `fade`, all by exp(-narrow r^2), and a
+    pixel weighs as much as it counts."""
     shape = frame["id"].shape
+    counts = np.ones(shape) if counts is None else counts
     for i in range(levels):
         weaker = fade if i == levels - 1 else np.ones_like(fade)
-        pixels = pixels_of(frame, x=image, v=variance, fade=weaker, narrow=narrow)
+        pixels = pixels_of(frame, x=image, v=variance, fade=weaker, narrow=narrow, counts=counts)
         total, squares, weights = np.zeros_like(image), np.zeros(shape), np.zeros(shape)
+        alike = np.zeros(shape)
         for dy in (-1, 0, 1):
             for dx in (-1, 0, 1):
                 where, p, q = pairs(pixels, shape, dy << i, dx << i)
@@ -115,11 +140,33 @@ def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, s
                     deviations = (lum(q.x) - lum(p.x)) / (np.sqrt(p.v) + 1e-6)
                     w = w * p.fade * np.exp(-(deviations / sigma) ** 2
                                             - p.narrow * (dy * dy + dx * dx) * 4**i)
+                alike[where] += w
+                w = w * q.counts
                 total[where] += w[..., None] * q.x
                 squares[where] += w * w * q.v
                 weights[where] += w
         image, variance = total / weights[..., None], squares / weights**2
+        counts = weights / alike
     return image
+
+
+def sample_variance(frame: Frame, samples: np.ndarray, there: np.ndarray, m) -> np.ndarray:
+    """Variance of the samples around that are there, near p's plane; 1/4 of less than two."""
+    shape = frame["id"].shape
+    pixels = pixels_of(frame, x=samples, there=1.0 * there)
+    count, first, second = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    for dy, dx in np.ndindex(5, 5):
+        where, p, q = pairs(pixels, shape, dy - 2, dx - 2)
+        if where is None:
+            continue
+        near = (q.there > 0) & (p.kind == q.kind) & ((p.kind < 2) | (
+            plane_weight_distance(p, q) < m.sigma_plane))
+        count[where] += near
+        first[where] += near * q.x
+        second[where] += near * q.x**2
+    several = count > 1
+    n = np.where(several, count, 2)
+    return np.where(several, np.maximum(second - first**2 / n, 0) / (n - 1), 0.25)
 
 
 def spatial_variance(frame: Frame, signal: np.ndarray, m) -> np.ndarray:
@@ -156,13 +203,15 @@ def look_up(previous: Frame, frame: Frame, image: np.ndarray, m) -> tuple:
     return np.where(found[..., None], history, 0), found
 
 
-def shadow_shift(previous: Frame, frame: Frame) -> np.ndarray:
-    """(h, w, 2) pixels by which each pixel's shadow was elsewhere; NaN if it was not.
+def shadow_shift(previous: Frame, frame: Frame, told: np.ndarray | None = None) -> np.ndarray:
+    """(h, w, 2) pixels by which each pixel's shadow was elsewhere; NaN if it was not, or was not
+    told of.
 
     In world space: the object that the shadow falls on stands still, lights and blockers move.
     """
     h, w = frame["id"].shape
     shift = np.full((h, w, 2), np.nan)
+    told = (frame["id"] >= 0) if told is None else told & (frame["id"] >= 0)
 
     def seen(surface: Any, object_: Any, point: np.ndarray) -> np.ndarray:
         """Where a point of an object was in the frame before, as the surface saw it."""
@@ -173,7 +222,7 @@ def shadow_shift(previous: Frame, frame: Frame) -> np.ndarray:
                 motion = (m if back else np.linalg.inv(m)) @ motion
         return (motion @ [*point, 1])[:3]
 
-    for y, x in np.argwhere((frame["id"] >= 0) & (frame["blocker_distance"] > 0)):
+    for y, x in np.argwhere(told & (frame["blocker_distance"] > 0)):
         i, position = frame["id"][y, x], frame["position"][y, x].astype(float)
         n, light = frame["normal"][y, x].astype(float), frame["light"][y, x].astype(float)
         share = frame["blocker_distance"][y, x] / np.linalg.norm(light)
@@ -187,12 +236,16 @@ def shadow_shift(previous: Frame, frame: Frame) -> np.ndarray:
     return shift
 
 
-def shadow_history(previous: Frame, frame: Frame, image: np.ndarray, m) -> tuple:
+def spread_out(frame: Frame, image: np.ndarray, m) -> np.ndarray:
+    """Means of what shadow rays tell, from a few pixels around."""
+    return smooth(frame, image, np.ones(frame["id"].shape), 1, m, first=2)
+
+
+def shadow_history(previous: Frame, frame: Frame, told: np.ndarray, image: np.ndarray, m) -> tuple:
     """What `look_up` finds where the shadow was, and where it finds it."""
-    shift = shadow_shift(previous, frame)
+    shift = shadow_shift(previous, frame, told)
     moves = np.isfinite(shift).all(-1, keepdims=True)
-    around = smooth(frame, np.concatenate([moves, np.where(moves, shift, 0)], -1),
-                    np.ones(frame["id"].shape), 1, m, first=2)
+    around = spread_out(frame, np.concatenate([moves, np.where(moves, shift, 0)], -1), m)
     near = (around[..., 0] > 1e-3) & (kind_of(frame) == 2)  # a lamp has no shadow
     shift = np.where(near[..., None], around[..., 1:] / np.maximum(around[..., :1], 1e-3), 0)
     position = frame["position"].astype(float)
@@ -217,9 +270,9 @@ def light_sizes(frame: Frame) -> dict[int, float]:
             if (lights == i).sum() > 3 else np.inf for i in np.unique(lights)}
 
 
-def narrowness(frame: Frame, m) -> np.ndarray:
+def narrowness(frame: Frame, told: np.ndarray, m) -> np.ndarray:
     """q / (2 p^2) from the widths of the penumbras around, 0 where nothing is in the way."""
-    stopped = (frame["id"] >= 0) & (frame["blocker_distance"] > 0)
+    stopped = told & (frame["id"] >= 0) & (frame["blocker_distance"] > 0)
     sizes = light_sizes(frame)
     size = np.vectorize(lambda i: sizes.get(int(i), np.inf))(frame["light_id"])
     d = frame["blocker_distance"].astype(float)
@@ -229,7 +282,7 @@ def narrowness(frame: Frame, m) -> np.ndarray:
     with np.errstate(invalid="ignore", divide="ignore"):
         width = size * d / ((whole - d) * cosine) * focal / frame["depth"]
     q = np.where(stopped, 1 / (width**2 + 1), 0)
-    around = smooth(frame, np.stack([stopped, q], -1), np.ones(q.shape), 1, m, first=2)
+    around = spread_out(frame, np.stack([stopped, q], -1), m)
     share = around[..., 0]
     return np.where(share > 1e-3, around[..., 1] / np.maximum(share, 1e-3), 0) / (2 * m.penumbra**2)
 
@@ -239,9 +292,9 @@ def run(frames: list[Frame], m) -> np.ndarray:
     sharp_levels = m.sharp_innovation_levels, m.sharp_output_levels
     settings = {
         "L": (m.light_alpha, m.innovation_levels, m.output_levels, m.light_sigma),
-        "G": (m.light_alpha, *sharp_levels, m.light_sigma),
-        "V": (m.visibility_alpha, *sharp_levels, m.visibility_sigma)}
-    kept: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        "G": (m.light_alpha, *sharp_levels, m.light_sigma)}
+    visible = m.visibility_alpha, *sharp_levels, m.visibility_sigma
+    kept: dict[str, tuple[np.ndarray, ...]] = {}  # h, s^2 and N
     energy = np.zeros(0)
     length, previous, out = np.zeros(0), None, {}
     for frame in frames:
@@ -252,45 +305,87 @@ def run(frames: list[Frame], m) -> np.ndarray:
             n = np.where(found, np.minimum(old[..., 0] + 1, m.max_history_length), 1)
         out = {}
         for name, d in signals_of(frame).items():
-            alpha, smoothing, levels, sigma = settings[name]
-            noise = spatial_variance(frame, d, m)
-            e, s2 = np.zeros_like(d), np.zeros(found.shape)
+            alpha, smoothing, levels, sigma = settings.get(name, visible)
+            sparse = name.isdigit()
+            levels = max(levels - 1, 1) if sparse else levels
+            told = frame["group"] == int(name) if sparse else np.ones(found.shape, bool)
+            omega = told * frame["group_sample"][..., 1].astype(float) if sparse else 1.0 * told
+            follows = m.follow_shadows and "light" in frame and (
+                sparse or (name == "V" and "group" not in frame))
+            lone = np.minimum(d / np.maximum(omega, 0.1)[..., None], 2)
+            noise = (sample_variance(frame, lone[..., 0], omega > 0, m) if sparse
+                     else spatial_variance(frame, d, m))
+            e, s2, h, samples = np.zeros_like(d), np.zeros(found.shape), 0 * d, 0 * omega
+            here = np.where(found, omega, 0) if sparse else omega
             if previous is not None:
-                both = np.concatenate([kept[name][0], kept[name][1][..., None]], -1)
+                both = np.concatenate([kept[name][0], *(k[..., None] for k in kept[name][1:])], -1)
                 both, _ = look_up(previous, frame, both, m)
-                e, s2 = np.where(found[..., None], d - both[..., :-1], 0), both[..., -1]
+                h, s2, samples = both[..., :-2], both[..., -2], both[..., -1]
+                e = np.where(found[..., None], d - omega[..., None] * h, 0)
                 energy = smooth(frame, lum(e)[..., None] ** 2, found, 2, m)[..., 0]
-                noise = np.where(found, np.maximum(energy - s2, energy / 4), noise)
-            narrow = (narrowness(frame, m) if name == "V" and m.follow_shadows
-                      and "light" in frame else np.zeros(found.shape))
-            a, q = np.maximum(1 / n, alpha), spread(frame, lum(e) ** 2, found, smoothing, m, narrow)
+            narrow = narrowness(frame, told, m) if follows else np.zeros(found.shape)
+            q = spread(frame, lum(e) ** 2, found, smoothing, m, narrow)
             wide = smooth(frame, e, found, smoothing, m, narrow=narrow)
-            follow = np.maximum(m.sharp_min_gain, a)
-            if name == "V" and previous is not None and m.follow_shadows and "light" in frame:
-                both = np.concatenate([kept[name][0], kept[name][1][..., None]], -1)
-                both, moves = shadow_history(previous, frame, both, m)
-                moves &= found
-                other = np.where(moves[..., None], d - both[..., :-1], e)
-                levels_ = min(max(5, m.sharp_innovation_levels), m.innovation_levels)
-                excess = smooth(frame, other**2 - e**2, found, levels_, m)
-                better = excess[..., 0] < 0
-                wide = np.where(excess < 0, smooth(frame, other, found, smoothing, m,
-                                                   narrow=narrow), wide)
-                e, s2 = np.where(excess < 0, other, e), np.where(better & moves, both[..., -1], s2)
-                energy = np.maximum(energy + np.minimum(excess[..., 0], 0), 0)
+            if previous is not None:
+                if follows:
+                    both = np.concatenate([kept[name][0], kept[name][1][..., None]], -1)
+                    both, moves = shadow_history(previous, frame, told, both, m)
+                    moves &= found
+                    there = both[..., :-1]
+                    other = np.where(moves[..., None], d - omega[..., None] * there, e)
+                    levels_ = min(max(5, m.sharp_innovation_levels), m.innovation_levels)
+                    excess = (smooth(frame, other**2 - e**2, found, 1, m, first=2) if sparse else
+                              smooth(frame, other**2 - e**2, found, levels_, m))
+                    excess = excess + 1e-6 if sparse else excess
+                    better = excess[..., 0] < 0
+                    wide = np.where(excess < 0, smooth(frame, other, found, smoothing, m,
+                                                       narrow=narrow), wide)
+                    e = np.where(excess < 0, other, e)
+                    if sparse:  # chosen before the smoothing
+                        wide = smooth(frame, e, found, smoothing, m, narrow=narrow)
+                        q = spread(frame, lum(e) ** 2, found, smoothing, m, narrow)
+                    s2 = np.where(better & moves, both[..., -1], s2)
+                    h = np.where((better & moves)[..., None], there, h)
+                    energy = np.maximum(energy + np.minimum(excess[..., 0], 0), 0)
                 noise = np.where(found, np.maximum(energy - s2, energy / 4), noise)
+            a, follow = np.maximum(1 / n, alpha), np.maximum(m.sharp_min_gain, alpha)
+            if sparse:
+                a = np.where(found, np.maximum(1 / (samples + omega + 0.5), alpha), 1)
             if name != "G":
                 certain = 1 - m.noise_threshold * q / np.maximum(lum(wide) ** 2, 1e-20)
                 follow = np.maximum(certain, m.min_gain if name == "L" else m.sharp_min_gain)
                 a = a if name == "L" else np.maximum(a, m.change_alpha * certain)
+            if sparse:
+                norm = norm_of(frame, here, found, smoothing, m, narrow)[..., None]
+                mean = np.clip(h + norm * wide, 0, 1)[..., 0]
+                noise = np.where(found, np.maximum(mean * (1 - mean), 0.01), noise)
+                rest = e - here[..., None] * norm * wide
+                history = h + follow[..., None] * norm * wide + np.minimum(a, 1)[..., None] * rest
+                history = np.where(found[..., None], history, np.where(omega[..., None] > 0,
+                                                                       lone, 0.5))
+                samples = samples + omega
+                a = np.where(found, np.minimum(a * omega, 1), omega > 0)
+            else:
                 follow = np.maximum(follow, a)
-            history = d - (1 - a)[..., None] * e + (follow - a)[..., None] * wide
+                history = d - (1 - a)[..., None] * e + (follow - a)[..., None] * wide
             s2 = (1 - a) ** 2 * s2 + a**2 * noise
-            kept[name] = history, s2
-            fade = np.clip(1 - (n - 1) / m.fade_frames, 0, 1)
-            out[name] = guided(frame, history, s2, levels, sigma, fade, narrow, m)
+            if sparse:
+                s2 = np.where(samples <= 1e-5, 0.25, s2)
+            fade = np.clip(1 - ((samples if sparse else n) - 1) / m.fade_frames, 0, 1)
+            out[name] = guided(frame, history, s2, levels, sigma, fade, narrow, m,
+                               np.clip(samples, 1e-5, 1) if sparse else None)
+            if sparse:
+                history = np.where(samples[..., None] > 1e-5, history, out[name])
+            kept[name] = history, s2, np.minimum(samples, 64)
         length, previous = n, frame
     return repaid(color_of(frames[-1], out), frames[-1]["id"])
+
+
+def norm_of(frame: Frame, omega: np.ndarray, counts: np.ndarray, levels: int, m,
+            narrow: np.ndarray | float = 0.0) -> np.ndarray:
+    """1 / S[omega], 0 where hardly a ray came by."""
+    weight = smooth(frame, omega[..., None], counts, levels, m, narrow=narrow)[..., 0]
+    return np.where(weight > 1e-5, 1 / np.maximum(weight, 1e-5), 0)
 
 
 def repaid(image: np.ndarray, id_: np.ndarray) -> np.ndarray:

@@ -29,7 +29,7 @@ from pathlib import Path
 
 import numpy as np
 
-from onespp.render.channels import CHANNELS, REFERENCE
+from onespp.render.channels import CHANNELS, MOST_GROUPS, REFERENCE
 from onespp.render.derived import available, sources, with_derived
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
@@ -180,8 +180,8 @@ class FrameSequence:
         images = self._read(self._path("frames", i), sources(names, self.manifest.channels))
         for name in images:
             if CHANNELS[name].is_id:
-                images[name] = object_ids(self._path("frames", i), name, images[name],
-                                          len(self.manifest.objects))
+                count = MOST_GROUPS if name == "group" else len(self.manifest.objects)
+                images[name] = object_ids(self._path("frames", i), name, images[name], count)
         return with_derived(Frame(i, images, *matrices), names)
 
     def read_matrices(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -19,6 +19,17 @@ The weights are those of plain light sampling: any weights do that add up to 1, 
 lights that touch the surface. The uniform part DELTA reaches lights whose midpoints all lie below
 the horizon.
 
+Where several lights meet, V is noise of which of them was picked. So lights are in groups g
+(`light_groups.py`) with a visibility each. There w_k c_k is in the place of c_k where strata are
+picked, w_k being the weight of k's midpoint; U_g is its sum over the strata of g, P_g that of p_k.
+The ray, if it went to g, tells
+
+    y = v l(w c) P_g / (p_k l(U_g)),   omega = l(w_k c_k) P_g / (p_k l(U_g)).
+
+Over the picks in g, omega has the mean 1 and y that of V_g, the share of U_g that arrives: the sum
+of y over that of omega, over pixels that see the same of g, is V_g without noise of choice. What
+the BSDF's sample runs into is in no group; unshadowed, it is U - sum U_g.
+
 Source: resampled importance sampling (Talbot et al. 2005) with the ratio estimator of Heitz et al.
 2018 ("Combining analytic direct illumination and stochastic shadows"), U by midpoints.
 """
@@ -26,6 +37,7 @@ Source: resampled importance sampling (Talbot et al. 2005) with the ratio estima
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 
@@ -35,6 +47,31 @@ from .sampler import Sampler
 
 GRID = 4
 DELTA = 0.1
+_DIMMEST = 1e-6  # share of l(U): a group that gives less has no visibility
+
+
+@dataclass
+class LightGroups:
+    """Which group each emitter is in, in the order of `scene.emitters()`; sizes: emitters in each.
+    """
+
+    of_emitter: mi.UInt32
+    sizes: tuple[int, ...]
+
+
+@dataclass
+class GroupSample:
+    """What the shadow ray says of the group of lights that it went to (see the module's header).
+
+    unshadowed: U_g of every group. group: g, -1 if no ray was sent. visibility: y. weight: omega.
+    chance: P_g.
+    """
+
+    unshadowed: list[mi.Color3f]
+    group: mi.Int32
+    visibility: mi.Float
+    weight: mi.Float
+    chance: mi.Float
 
 
 @dataclass
@@ -43,7 +80,7 @@ class DirectLight:
 
     light: from the surface to the light's point, 0 where no ray was sent. blocker_distance: from
     the surface to what stopped the ray, 0 if nothing did. light_shape, blocker_shape: index in the
-    JIT registry, 0 for none.
+    JIT registry, 0 for none. groups: None where all lights are one.
     """
 
     direct: mi.Color3f
@@ -52,12 +89,17 @@ class DirectLight:
     light_shape: mi.UInt32
     blocker_distance: mi.Float
     blocker_shape: mi.UInt32
+    groups: GroupSample | None = None
 
 
 @dr.syntax
 def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
-                    active: mi.Bool) -> DirectLight:
-    """Direct light toward `si.wi` from light sampling, one shadow ray a lane."""
+                    active: mi.Bool, groups: Any = None) -> DirectLight:
+    """Direct light toward `si.wi` from light sampling, one shadow ray a lane.
+
+    Args:
+        groups: `LightGroups`, None where all lights are one.
+    """
     emitters = len(scene.emitters())
     strata = GRID * GRID * emitters
     choice, jitter = sampler.next_1d(), sampler.next_2d()
@@ -66,11 +108,16 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     left = mi.Float(choice)
     unshadowed, total = mi.Color3f(0), mi.Float(0)
     picked, picked_luminance = mi.UInt32(0), mi.Float(0)
+    by_group = [mi.Color3f(0) for _ in groups.sizes] if groups else []
     k = mi.UInt32(0)
     while dr.hint(k < strata, max_iterations=strata, label="lights"):
-        c, _ = contribution(scene, si, k, mi.Point2f(0.5), active)
-        luminance = mi.luminance(c)
+        c, light = contribution(scene, si, k, mi.Point2f(0.5), active)
         unshadowed += c
+        if dr.hint(groups is not None, mode="scalar"):
+            c = weight(si, light, emitters, active) * c
+            group = dr.gather(mi.UInt32, groups.of_emitter, k // (GRID * GRID), active)
+            by_group = added(by_group, group, c)
+        luminance = mi.luminance(c)
         total += luminance
         share = dr.select(total > 0, luminance / total, 0)
         taken = left < share
@@ -85,8 +132,10 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     uniform = dark | (left < DELTA)
     anywhere = dr.select(dark, choice, left / DELTA)
     picked = dr.select(uniform, dr.minimum(mi.UInt32(anywhere * strata), strata - 1), picked)
-    midpoint, _ = contribution(scene, si, picked, mi.Point2f(0.5), active & uniform)
-    picked_luminance = dr.select(uniform, mi.luminance(midpoint), picked_luminance)
+    middle, light = contribution(scene, si, picked, mi.Point2f(0.5), active & uniform)
+    if dr.hint(groups is not None, mode="scalar"):
+        middle = weight(si, light, emitters, active & uniform) * middle
+    picked_luminance = dr.select(uniform, mi.luminance(middle), picked_luminance)
     p = dr.select(dark, 1, (1 - DELTA) * strata * picked_luminance / total + DELTA) / strata
 
     c, light = contribution(scene, si, picked, jitter, active)
@@ -94,12 +143,38 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     toward = si.spawn_ray_to(light.p)
     blocker = scene.ray_intersect_preliminary(toward, coherent=False, active=lit)
     shadowed = blocker.is_valid()
-    bsdf_pdf = si.bsdf().pdf(mi.BSDFContext(), si, si.to_local(light.d), lit)
-    w = dr.select(light.delta, 1, power_heuristic(light.pdf / emitters, bsdf_pdf))
+    w = weight(si, light, emitters, lit)
+    direct = dr.select(lit & ~shadowed, w * c / p, 0)
+    sample = None
+    if dr.hint(groups is not None, mode="scalar"):
+        group = dr.gather(mi.UInt32, groups.of_emitter, picked // (GRID * GRID), active)
+        sample = group_sample(groups, by_group, group, total, mi.luminance(direct),
+                              picked_luminance / p, active)
     return DirectLight(
-        dr.select(lit & ~shadowed, w * c / p, 0), unshadowed,
+        direct, unshadowed,
         dr.select(lit, light.p - si.p, 0), shape_index(light.emitter.get_shape(), lit),
-        dr.select(lit & shadowed, blocker.t, 0), shape_index(blocker.shape, lit & shadowed))
+        dr.select(lit & shadowed, blocker.t, 0), shape_index(blocker.shape, lit & shadowed), sample)
+
+
+def added(lights: list[mi.Color3f], group: mi.UInt32, light: mi.Color3f) -> list[mi.Color3f]:
+    """The light of each group, with some more of one."""
+    return [dr.select(group == g, u + light, u) for g, u in enumerate(lights)]
+
+
+def group_sample(groups: LightGroups, unshadowed: list[mi.Color3f], group: mi.UInt32,
+                 total: mi.Float, arrived: mi.Float, possible: mi.Float,
+                 active: mi.Bool) -> GroupSample:
+    """What a ray to a group tells; arrived: v l(w c) / p_k. possible: l(w_k c_k) / p_k."""
+    chance, of_group = mi.Float(0), mi.Float(0)
+    for g, size in enumerate(groups.sizes):
+        luminance, is_it = mi.luminance(unshadowed[g]), group == g
+        of_group = dr.select(is_it, luminance, of_group)
+        share = (1 - DELTA) * luminance / total + DELTA * (size / sum(groups.sizes))
+        chance = dr.select(is_it, share, chance)
+    told = active & (of_group > _DIMMEST * total)
+    scale = dr.select(told, chance / of_group, 0)
+    return GroupSample(unshadowed, dr.select(told, mi.Int32(group), -1), scale * arrived,
+                       scale * possible, dr.select(told, chance, 0))
 
 
 def shape_index(shape: mi.ShapePtr, active: mi.Bool) -> mi.UInt32:
@@ -117,6 +192,13 @@ def contribution(scene: mi.Scene, si: mi.SurfaceInteraction3f, k: mi.UInt32, pla
     value = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(light.d), active)
     c = dr.select(active & (light.pdf > 0), value * weight, 0) / (GRID * GRID)
     return c, light
+
+
+def weight(si: mi.SurfaceInteraction3f, light: mi.DirectionSample3f, emitters: int,
+           active: mi.Bool) -> mi.Float:
+    """Of multiple importance sampling, for a point of a light, as plain light sampling has it."""
+    bsdf_pdf = si.bsdf().pdf(mi.BSDFContext(), si, si.to_local(light.d), active)
+    return dr.select(light.delta, 1, power_heuristic(light.pdf / emitters, bsdf_pdf))
 
 
 def power_heuristic(p: mi.Float, q: mi.Float) -> mi.Float:

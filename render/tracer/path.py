@@ -21,7 +21,7 @@ import drjit as dr
 from onespp.render.mitsuba.variant import mi
 
 from .candidates import sought_light
-from .lights import DirectLight, power_heuristic, resample_lights, shape_index
+from .lights import DirectLight, LightGroups, power_heuristic, resample_lights, shape_index
 from .sampler import Sampler, Sobol
 
 LARGEST_VISIBILITY = 1e4  # picks of 16 lights give up to 2560, by what lights.py lets a pick weigh
@@ -51,7 +51,8 @@ class Radiance:
 
 @dr.syntax
 def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
-          max_depth: int, resampled: bool = False, candidates: int = 1) -> Radiance:
+          max_depth: int, resampled: bool = False, candidates: int = 1,
+          groups: LightGroups | None = None) -> Radiance:
     """One path a lane.
 
     Args:
@@ -60,6 +61,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         max_depth: longest path in segments, as in Mitsuba (1: emission, 2: direct light).
         resampled: direct light at the first hit by resampling instead of by MIS.
         candidates: points of the lights that a vertex compares before it sends its shadow ray.
+        groups: of lights, which the shadow ray then tells apart.
     """
     context = mi.BSDFContext()
     ray = mi.Ray3f(ray)
@@ -79,7 +81,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     if dr.hint(resampled and max_depth > 1, mode="scalar"):
         first = pi.compute_surface_interaction(ray)
         smooth = first.is_valid() & mi.has_flag(first.bsdf().flags(), mi.BSDFFlags.Smooth)
-        split = resample_lights(scene, first, sampler, smooth)
+        split = resample_lights(scene, first, sampler, smooth, groups)
         direct += split.direct
         arrived += split.direct
 

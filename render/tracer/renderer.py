@@ -8,7 +8,16 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from onespp.render.channels import FRAME, GLOSS, RADIANCE, REPLAY, SHADOW, SPLIT
+from onespp.render.channels import (
+    FRAME,
+    GLOSS,
+    GROUPED,
+    RADIANCE,
+    REPLAY,
+    SHADOW,
+    SPLIT,
+    UNSHADOWED,
+)
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.mitsuba.variant import mi
@@ -28,13 +37,14 @@ class Renderer(View):
     @property
     def channels(self) -> tuple[str, ...]:
         """All channels of its frames that are not the same in any scene of this kind."""
-        return (FRAME + (SPLIT + SHADOW if self._splits else ())
+        return (FRAME + (SPLIT + SHADOW if self.splits else ()) + self._grouped
                 + (GLOSS if self.stage.glossy else ()))
 
     @property
-    def _splits(self) -> bool:
-        """Whether direct light is split: paths of one segment have none."""
-        return self.direct == "resampled" and self.scene.max_depth > 1
+    def _grouped(self) -> tuple[str, ...]:
+        """The channels of groups that its frames have."""
+        count = len(self.groups.sizes) if self.groups else 0
+        return ("group", "group_sample", *UNSHADOWED[:count]) if count else ()
 
     def frame(self, index: int, seed: int = 0, channels: Sequence[str] = FRAME) -> Frame:
         """One frame at 1 spp: one kernel, only the channels asked for.
@@ -43,11 +53,15 @@ class Renderer(View):
         are rendered: the channels of `replay.py` replay frame `index` - 1, whether or not it is
         asked for, and frame 0 has nothing to replay.
         """
-        if not self._splits and set(channels) & {*SPLIT, *SHADOW}:
+        if not self.splits and set(channels) & {*SPLIT, *SHADOW}:
             raise InputError(f"the channels {', '.join(SPLIT + SHADOW)} need --direct resampled "
                              "and a scene of max_depth 2 or more")
+        if lacking := [c for c in channels if c in GROUPED and c not in self._grouped]:
+            raise InputError(f"the channels {', '.join(lacking)} need --direct resampled and a "
+                             f"scene of more lights than '{self.scene.name}' has")
         before = index - 1 if index > 0 else None
         replayed = replay(self, index, before, seed) if set(channels) & set(REPLAY) else {}
+        _ = self.groups  # before the stage is set: to find them moves it
         self.stage.set_frame(index)
         planes = self._trace_frame(index, seed, [c for c in channels if c not in REPLAY])
         dr.eval(planes)
@@ -83,10 +97,10 @@ class Renderer(View):
             ray, depth_per_length = rays.at(*self.centres(pixel))
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
             planes = {}
-            if set(channels) & {*RADIANCE, *SPLIT, *SHADOW, *GLOSS}:
+            if set(channels) & {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS}:
                 sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
                 radiance = trace(scene, ray, pi, sampler, self.scene.max_depth,
-                                 self.direct == "resampled", self.candidates)
+                                 self.direct == "resampled", self.candidates, self.groups)
                 unit = dr.opaque(mi.Float, self.stage.unit)
                 planes = {
                     "color": radiance.emission + radiance.direct + radiance.indirect,
@@ -106,6 +120,12 @@ class Renderer(View):
                         "blocker_distance": radiance.shadow_ray.blocker_distance * unit,
                         "blocker_id": self.stage.object_id(radiance.shadow_ray.blocker_shape),
                     }
+                    if told := radiance.shadow_ray.groups:
+                        planes |= {
+                            "group": told.group,
+                            "group_sample": mi.Vector3f(told.visibility, told.weight, told.chance),
+                            **dict(zip(UNSHADOWED, told.unshadowed)),
+                        }
             if set(channels) & set(GBUFFER):
                 hit = PrimaryHit(self.stage, pi.compute_surface_interaction(ray), depth_per_length)
                 planes |= {name: GBUFFER[name](hit) for name in channels if name in GBUFFER}

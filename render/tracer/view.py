@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 from onespp.render.errors import InputError
@@ -12,6 +13,8 @@ from onespp.scenes.description import Scene
 
 from .camera_rays import PixelRays, pixel_rays
 from .candidates import candidates_for
+from .light_groups import find_groups
+from .lights import LightGroups
 from .sampler import BlueNoise, Keys, Pcg, Sampler, Sobol, z_order
 
 DIRECT = ("mis", "resampled")
@@ -47,6 +50,17 @@ class View:
         self.scene, self.height, self.width = scene, height, width
         self.stage = MitsubaScene(scene)
         self.candidates = 1 if direct == "mis" else candidates_for(self.stage.mi_scene)
+
+    @property
+    def splits(self) -> bool:
+        """Whether direct light is split: paths of one segment have none."""
+        return self.direct == "resampled" and self.scene.max_depth > 1
+
+    @cached_property
+    def groups(self) -> LightGroups | None:
+        """Of lights, each with a visibility of its own; None where there is one, or no split. To
+        find them moves the stage."""
+        return find_groups(self.stage) if self.splits else None
 
     def rays(self) -> PixelRays:
         """Rays through points of the image, at the frame that the stage is set to."""

@@ -28,6 +28,17 @@ takes out of l(d): `spatial_variances`.
 Visibility has two histories, where the surface was and where its shadow was: `shadow_motion.py`.
 Where the latter is taken, W is less by as much as its e^2 is, smoothed, and at least 0.
 
+Of groups of lights a pixel's ray tells of one, y with the weight omega (`lights.py`): signals are
+*sparse*. Their innovation is e = y - omega h, 0 where the ray went elsewhere, and a smoothing is a
+ratio of sums, S[e] / S[omega], without noise of which light was picked. History takes
+
+    h <- h + f S[e] / S[omega] + a (e - omega S[e] / S[omega]),   a = max(1 / (N + 1/2), ...),
+
+N being the sum of omega over its frames, this one included. The noise of a sample is that of a
+coin, s_0^2 = v (1 - v), v = h + S[e] / S[omega], and which history is the right one is told before
+the smoothing by excess over fewer pixels (`passes.py`). In the last filter a pixel counts by
+what its history holds, min(N, 1), and one that has had no ray yet keeps what the filter found.
+
 A smoothing is a-trous levels of 3x3 taps, h = {1/4, 1/2, 1/4}^2, 2^i pixels apart. The last filter
 of h compares luminance too,
 
@@ -51,10 +62,10 @@ from typing import NamedTuple
 import drjit as dr
 
 from onespp.denoise.filters.penumbra import footprint_falloff
-from onespp.denoise.history.records import look_up, pack_records
+from onespp.denoise.history.records import look_up, pack_records, record_words
 from onespp.denoise.history.reprojection import Motion, ReprojectionTests, locate
 from onespp.denoise.history.shadow_motion import MIN_SHARE, look_up_shadow
-from onespp.denoise.inputs.signals import Signal, SignalKind
+from onespp.denoise.inputs.signals import Chosen, Signal
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.grid import Stencil
@@ -62,18 +73,29 @@ from onespp.denoise.jit.structure import mapped
 
 from .layout import History, SignalLayout, Smoothed
 from .noise import MAX_ENERGY
+from .output import FEWEST_SAMPLES
 from .shadows import Shadows
 
+_TIE = 1e-6                    # excess of a history that is no better nor worse
 _NO_HISTORY = -3e14            # 1/z of a pixel without history
 
 
 class ShadowInnovation(NamedTuple):
-    """Visibility's innovation from its shadow history, that history's variance, and how much
+    """Visibility's innovation from its shadow history, that history and its variance, and how much
     greater the square of the innovation is than that of the other one."""
 
     innovation: Float
+    history: Float
     variance: Float
     excess: Float
+
+
+class SparseHistory(NamedTuple):
+    """Of a sparse signal: omega, 0 without history; h, and N without this frame."""
+
+    weight: Float
+    history: Float
+    samples: Float
 
 
 class Innovations(NamedTuple):
@@ -83,8 +105,8 @@ class Innovations(NamedTuple):
         signals: e of each signal, 0 without history. energies: l(e)^2 of each.
         length: n, 1 without history. variances: s^2 of each signal's history.
         valid_inverse_depth: 1/z, far away without history.
-        shadow: of visibility's other history. footprint_falloff: of `penumbra.py`.
-            None without shadow rays, both.
+        shadows: of the other history of each visibility that has one. footprint_falloffs: of
+            `penumbra.py`, of each of those. sparse: of each sparse signal.
     """
 
     signals: list[Signal]
@@ -92,14 +114,16 @@ class Innovations(NamedTuple):
     length: Float
     variances: list[Float]
     valid_inverse_depth: Float
-    shadow: ShadowInnovation | None
-    footprint_falloff: Float | None
+    shadows: list[ShadowInnovation]
+    footprint_falloffs: list[Float]
+    sparse: list[SparseHistory]
 
 
 def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signal],
-                surface: SurfaceSample, plane: TangentPlane, motion: Motion, records: Float,
-                shadows: Shadows | None, tests: ReprojectionTests, max_history_length: Float,
-                falloff_scale: Float) -> Innovations:
+                     chosen: Chosen | None, surface: SurfaceSample, plane: TangentPlane,
+                     motion: Motion, records: Float, shadows: list[Shadows],
+                     tests: ReprojectionTests, max_history_length: Float,
+                     falloff_scale: Float) -> Innovations:
     """The innovation of each signal.
 
     Args:
@@ -107,39 +131,90 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
         shadows: of `follow_shadows`, smoothed. falloff_scale: of `penumbra.footprint_falloff`.
     """
     place = locate(stencil, surface, motion, tests.plane_tolerance)
-    words, is_valid = look_up(stencil, place, records, layout.record_values, tests.min_cosine)
+    record_words_ = record_words(layout.record_values)
+    words, is_valid = look_up(stencil, place, records, layout.record_values, tests.min_cosine,
+                              words=record_words_)
     length, history = layout.unpack(words)
-    e = [mapped(lambda d, h: dr.select(is_valid, d - h, 0), signal, old.signal)
-         for signal, old in zip(signals, history, strict=True)]
+    omegas = weights_of(layout, chosen)
+    e, sparse = [], []
+    for signal, old, omega in zip(signals, history, omegas, strict=True):
+        if omega is None:
+            e.append(mapped(lambda d, h: dr.select(is_valid, d - h, 0), signal, old.signal))
+            continue
+        assert old.samples is not None
+        h = old.signal.luminance
+        e.append(Signal(None, dr.select(is_valid, dr.fma(-omega, h, signal.luminance), 0), None))
+        sparse.append(SparseHistory(dr.select(is_valid, omega, 0), h,
+                                    dr.select(is_valid, old.samples, 0)))
     energies = [dr.minimum(dr.square(s.luminance), MAX_ENERGY) for s in e]
     variances = [old.variance for old in history]
     length = dr.select(is_valid, dr.minimum(length + 1, max_history_length), 1)
     valid_inverse_depth = dr.select(is_valid, plane.inverse_depth, _NO_HISTORY)
-    if shadows is None:
-        return Innovations(e, energies, length, variances, valid_inverse_depth, None, None)
-    visibility, variance, moves = look_up_shadow(stencil, surface, plane, motion, records,
-                                                 shadows.motion, tests)
-    moves &= is_valid
-    other = dr.select(moves, signals[-1].luminance - visibility, e[-1].luminance)
-    shadow = ShadowInnovation(other, dr.select(moves, variance, variances[-1]),
-                              dr.square(other) - energies[-1])
-    return Innovations(e, energies, length, variances, valid_inverse_depth, shadow,
-                       footprint_falloff(shadows.penumbra, falloff_scale, MIN_SHARE))
+    others = []
+    for f, shadow in enumerate(shadows):
+        s = len(signals) - len(shadows) + f
+        visibility, variance, moves = look_up_shadow(
+            stencil, surface, plane, motion, records, shadow.motion, tests,
+            layout.record_place(s), record_words_)
+        moves &= is_valid
+        omega = omegas[s]
+        there = visibility if omega is None else omega * visibility
+        other = dr.select(moves, signals[s].luminance - there, e[s].luminance)
+        others.append(ShadowInnovation(
+            other, dr.select(moves, visibility, history[s].signal.luminance),
+            dr.select(moves, variance, variances[s]), dr.square(other) - energies[s]))
+    return Innovations(e, energies, length, variances, valid_inverse_depth, others,
+                       [footprint_falloff(shadow.penumbra, falloff_scale, MIN_SHARE)
+                        for shadow in shadows], sparse)
+
+
+def choose_histories(layout: SignalLayout, innovations: Innovations,
+                     excess: list[Float]) -> Innovations:
+    """With its shadow history in the place of the other one where that of a sparse signal is
+    better; excess: of each, smoothed."""
+    signals, energies = list(innovations.signals), list(innovations.energies)
+    variances, sparse = list(innovations.variances), list(innovations.sparse)
+    for g, (shadow, more) in enumerate(zip(innovations.shadows, excess, strict=True)):
+        s, better = len(layout.kinds) - layout.groups + g, more < -_TIE
+        e = dr.select(better, shadow.innovation, signals[s].luminance)
+        signals[s], energies[s] = Signal(None, e, None), dr.minimum(dr.square(e), MAX_ENERGY)
+        variances[s] = dr.select(better, shadow.variance, variances[s])
+        sparse[g] = sparse[g]._replace(
+            history=dr.select(better, shadow.history, sparse[g].history))
+    return innovations._replace(signals=signals, energies=energies, variances=variances,
+                                sparse=sparse, shadows=[])
+
+
+def weights_of(layout: SignalLayout, chosen: Chosen | None) -> list[Float | None]:
+    """omega of each signal that is sparse."""
+    weights: list[Float | None] = []
+    for s in range(len(layout.kinds)):
+        g = layout.group(s)
+        weights.append(None if g is None or chosen is None
+                       else dr.select(chosen.group == g, chosen.weight, 0))
+    return weights
 
 
 def to_smooth(layout: SignalLayout, innovations: Innovations) -> Smoothed:
     """What is smoothed of the innovation."""
-    has_visibility = SignalKind.VISIBILITY in layout.kinds
     diffuse, *sharp = innovations.signals
+    dense = len(layout.kinds) - layout.groups
     return Smoothed(
         diffuse_spread=innovations.energies[0], diffuse=diffuse,
-        excess=innovations.shadow.excess if innovations.shadow else None,
-        visibility_spread=innovations.energies[-1] if has_visibility else None, sharp=sharp,
-        shadow_innovation=innovations.shadow.innovation if innovations.shadow else None,
-        energies=innovations.energies)
+        excess=[shadow.excess for shadow in innovations.shadows],
+        visibility_spread=[innovations.energies[s] for s in layout.visibilities], sharp=sharp,
+        shadow_innovation=[shadow.innovation for shadow in innovations.shadows],
+        weights=[sparse.weight for sparse in innovations.sparse],
+        energies=innovations.energies[:dense])
 
 
-def pack_history(stencil: Stencil, layout: SignalLayout, surface: SurfaceSample,
-                 history: History) -> Float:
-    """Records of a frame."""
-    return pack_records(stencil, surface, layout.pack(history))
+def pack_history(stencil: Stencil, layout: SignalLayout, surface: SurfaceSample, history: History,
+                 filtered: list[Signal] | None) -> Float:
+    """Records of a frame. A sparse signal that had no sample yet is what was filtered."""
+    signals = list(history.signals)
+    for s, noisy in enumerate(signals):
+        if noisy.samples is not None and filtered is not None:
+            signals[s] = noisy._replace(signal=Signal(None, dr.select(
+                noisy.samples > FEWEST_SAMPLES, noisy.signal.luminance, filtered[s].luminance),
+                None))
+    return pack_records(stencil, surface, layout.pack(history._replace(signals=signals)))

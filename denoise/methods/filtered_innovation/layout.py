@@ -1,12 +1,14 @@
 """Which planes the filtered innovation works on: the one place that knows.
 
-A frame has some of three signals (`signals.py`), each of three planes or one. What is smoothed and
-filtered lies side by side in the planes of one buffer, in the order of leaving: diffuse light goes
-through all levels, visibility and glossy light (the sharp signals) through fewer, energies through
-the first ones. A level works on the planes that are left, the first so many. Each of them goes by
-the rule of its own `PlaneRule`, from which kernels are built.
+A frame has signals of three kinds (`signals.py`), each of three planes or one. Those of groups of
+lights are the last, and *sparse*: a pixel's shadow ray went to one group at most. What is smoothed
+and filtered lies side by side in the planes of one buffer, in the order of leaving: diffuse light
+goes through all levels, visibility and glossy light (the sharp signals) through fewer, energies
+through the first ones. A level works on the planes that are left, the first so many. Each of them
+goes by the rule of its own `PlaneRule`, from which kernels are built.
 
-A record of the history holds the last signal first, so that visibility can be looked up alone.
+A record of the history holds first the visibility that shadow rays tell of, the last signal or
+those of groups, so that it can be looked up alone.
 """
 
 # pyright: standard
@@ -27,10 +29,12 @@ ENERGY_LEVELS = 2
 
 
 class NoisySignal(NamedTuple):
-    """A signal and the variance of its luminance's noise."""
+    """A signal and the variance of its luminance's noise; of a sparse one, N, how many samples
+    its history holds, or how much it counts in the last filter."""
 
     signal: Signal
     variance: Float
+    samples: Float | None = None
 
 
 class History(NamedTuple):
@@ -45,28 +49,31 @@ class Smoothed(NamedTuple):
 
     Attributes:
         diffuse_spread: Q of diffuse light. diffuse: S[e] of it.
-        excess: S of how much greater e^2 is in visibility's shadow history than in the other.
-        visibility_spread: Q of visibility. sharp: S[e] of glossy light and of visibility.
-        shadow_innovation: S[e] of visibility's shadow history. energies: W[l(e)^2] of each signal.
+        excess: S of how much greater e^2 is in visibility's shadow history than in the other, of
+            each visibility that has one and is not sparse.
+        visibility_spread: Q of each visibility. sharp: S[e] of glossy light and of visibility.
+        shadow_innovation: S[e] of each of those histories. weights: S[omega] of each sparse signal.
+        energies: W[l(e)^2] of each signal that is not sparse.
     """
 
     diffuse_spread: Float
     diffuse: Signal
-    excess: Float | None
-    visibility_spread: Float | None
+    excess: list[Float]
+    visibility_spread: list[Float]
     sharp: list[Signal]
-    shadow_innovation: Float | None
+    shadow_innovation: list[Float]
+    weights: list[Float]
     energies: list[Float]
 
 
 @dataclass(frozen=True)
 class PlaneRule:
     """How a plane is smoothed: through how many levels; with the squares of the weights, as the
-    variance of a mean is; no farther than shadows are soft."""
+    variance of a mean is; no farther than shadows of a light, by its number, are soft."""
 
     levels: int
     squared: bool = False
-    within_penumbra: bool = False
+    penumbra: int | None = None
 
 
 @dataclass(frozen=True)
@@ -75,12 +82,15 @@ class SignalLayout:
 
     Attributes:
         kinds: of signals, diffuse light first and visibility last.
+        groups: of lights, whose sparse signals are the last; 0: all lights are one.
         has_shadow_rays: visibility has a second history, and penumbras are known.
         innovation_levels, output_levels: of diffuse light, in the smoothing of the innovation and
-            in the last filter. sharp_*: those of the other signals.
+            in the last filter. sharp_*: those of the other signals; the last filter of sparse ones
+            has one level less (measured: no worse, and quicker).
     """
 
     kinds: tuple[SignalKind, ...]
+    groups: int
     has_shadow_rays: bool
     innovation_levels: int
     sharp_innovation_levels: int
@@ -98,58 +108,103 @@ class SignalLayout:
         return [visibility if kind is SignalKind.VISIBILITY else light for kind in self.kinds]
 
     @property
+    def visibilities(self) -> list[int]:
+        """Which signals are visibility."""
+        return [s for s, kind in enumerate(self.kinds) if kind is SignalKind.VISIBILITY]
+
+    @property
+    def followed(self) -> int:
+        """How many signals of visibility, the last so many, shadow rays tell of."""
+        return (self.groups or 1) if self.has_shadow_rays else 0
+
+    def follower(self, s: int) -> int | None:
+        """Which of the visibilities that shadow rays tell of a signal is."""
+        f = s - len(self.kinds) + self.followed
+        return f if f >= 0 else None
+
+    def group(self, s: int) -> int | None:
+        """Which group's visibility a signal is, if it is sparse."""
+        g = s - len(self.kinds) + self.groups
+        return g if g >= 0 else None
+
+    @property
     def smoothing_rules(self) -> list[PlaneRule]:
         """Of each plane of `Smoothed`, depth first."""
         rule: Any = PlaneRule  # in the place of the plane that goes by it
         diffuse, sharp = self.innovation_levels, self.sharp_innovation_levels
-        visible, shadowed = SignalKind.VISIBILITY in self.kinds, self.has_shadow_rays
-        glossy = Signal(*[rule(sharp)] * 3)
-        visibility = rule(sharp, within_penumbra=shadowed)
+        light = Signal(*[rule(sharp)] * 3)
+        visible = [rule(sharp, penumbra=self.follower(s)) for s in self.visibilities]
+        chosen = visible if self.has_shadow_rays and not self.groups else []
+        glossy = [light] * self.kinds.count(SignalKind.GLOSSY)
         return _leaves(Smoothed(
             diffuse_spread=rule(diffuse, squared=True),
             diffuse=Signal(*[rule(diffuse)] * 3),
-            excess=rule(max(CHOICE_LEVELS, sharp)) if shadowed else None,
-            visibility_spread=replace(visibility, squared=True) if visible else None,
-            sharp=[Signal(None, visibility, None) if kind is SignalKind.VISIBILITY else glossy
-                   for kind in self.kinds[1:]],
-            shadow_innovation=visibility if shadowed else None,
-            energies=[rule(ENERGY_LEVELS) for _ in self.kinds]))
+            excess=[rule(max(CHOICE_LEVELS, sharp)) for _ in chosen],
+            visibility_spread=[replace(one, squared=True) for one in visible],
+            sharp=[*glossy, *(Signal(None, one, None) for one in visible)],
+            shadow_innovation=chosen,
+            weights=visible[len(visible) - self.groups:],
+            energies=[rule(ENERGY_LEVELS)] * (len(self.kinds) - self.groups)))
 
     def smoothing_level(self, level: int) -> list[PlaneRule]:
         """Rules of the planes that are left at a level, the first so many."""
         return [rule for rule in self.smoothing_rules if level < rule.levels]
 
-    def output_level(self, level: int) -> list[SignalKind]:
+    def output_level(self, level: int) -> list[int]:
         """The signals that are left at a level of the last filter, the first so many."""
-        return list(self.kinds if level < self.sharp_output_levels else self.kinds[:1])
+        return [s for s in range(len(self.kinds)) if level < self._output_levels(s)]
 
-    def is_last_level(self, kind: SignalKind, level: int) -> bool:
+    def is_last_level(self, s: int, level: int) -> bool:
         """Whether the last filter of a signal ends with a level."""
-        levels = (self.output_levels if kind is SignalKind.DIFFUSE else self.sharp_output_levels)
-        return level == levels - 1
+        return level == self._output_levels(s) - 1
 
-    def output_planes(self, kinds: Sequence[SignalKind]) -> int:
-        """Planes of noisy signals of these kinds."""
-        return sum(2 if kind is SignalKind.VISIBILITY else 4 for kind in kinds)
+    def _output_levels(self, s: int) -> int:
+        if s == 0:
+            return self.output_levels
+        return max(self.sharp_output_levels - (self.group(s) is not None), 1)
 
-    def noisy_signals(self, kinds: Sequence[SignalKind]) -> Callable[..., list[NoisySignal]]:
-        """Function of the planes of signals of these kinds, side by side, to the signals."""
-        return lambda *planes: _noisy_signals(iter(planes), kinds)
+    def output_planes(self, signals: Sequence[int]) -> int:
+        """Planes of these noisy signals."""
+        return sum((2 if self.kinds[s] is SignalKind.VISIBILITY else 4)
+                   + (self.group(s) is not None) for s in signals)
+
+    def noisy_signals(self, signals: Sequence[int]) -> Callable[..., list[NoisySignal]]:
+        """Function of the planes of these signals, side by side, to the signals."""
+        return lambda *planes: [self._noisy_signal(s, iterator) for iterator in [iter(planes)]
+                                for s in signals]
 
     def pack(self, history: History) -> list[Any]:
         """What a record holds, in its order (a structure)."""
-        return [history.signals[-1], history.length, *history.signals[:-1]]
+        rest = len(self.kinds) - self._looked_up
+        return [history.signals[rest:], history.length, *history.signals[:rest]]
 
     def unpack(self, values: Iterable[Float]) -> History:
         """The history, of the values of a record."""
-        planes = iter(values)
-        (last,) = _noisy_signals(planes, self.kinds[-1:])
+        planes, rest = iter(values), len(self.kinds) - self._looked_up
+        first = [self._noisy_signal(s, planes) for s in range(rest, len(self.kinds))]
         length = next(planes)
-        return History(length, [*_noisy_signals(planes, self.kinds[:-1]), last])
+        return History(length, [*(self._noisy_signal(s, planes) for s in range(rest)), *first])
 
     @property
     def record_values(self) -> int:
-        return 1 + self.output_planes(self.kinds)
+        return 1 + self.output_planes(range(len(self.kinds)))
+
+    def record_place(self, s: int) -> int:
+        """Where a visibility that shadow rays tell of is among the values of a record."""
+        return 3 * (self.group(s) or 0)
+
+    @property
+    def _looked_up(self) -> int:
+        """How many signals are the first in a record."""
+        return self.groups or 1
+
+    def _noisy_signal(self, s: int, planes: Iterator[Float]) -> NoisySignal:
+        if self.kinds[s] is SignalKind.VISIBILITY:
+            signal = Signal(None, next(planes), None)
+        else:
+            signal = Signal(next(planes), next(planes), next(planes))
+        return NoisySignal(signal, next(planes),
+                           next(planes) if self.group(s) is not None else None)
 
 
 def _leaves(structure: Any) -> list[Any]:
@@ -157,14 +212,3 @@ def _leaves(structure: Any) -> list[Any]:
     if isinstance(structure, (list, tuple)):
         return [leaf for part in structure for leaf in _leaves(part)]
     return [] if structure is None else [structure]
-
-
-def _noisy_signals(planes: Iterator[Float], kinds: Sequence[SignalKind]) -> list[NoisySignal]:
-    signals = []
-    for kind in kinds:
-        if kind is SignalKind.VISIBILITY:
-            signal = Signal(None, next(planes), None)
-        else:
-            signal = Signal(next(planes), next(planes), next(planes))
-        signals.append(NoisySignal(signal, next(planes)))
-    return signals

@@ -8,18 +8,23 @@ from typing import NamedTuple
 
 import drjit as dr
 
-from onespp.denoise.inputs.signals import Signal, SignalKind
+from onespp.denoise.inputs.signals import LARGEST_VISIBILITY, Chosen, Signal, SignalKind
 from onespp.denoise.inputs.surface import TangentPlane
 from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import mapped
 
-from .innovation import Innovations, ShadowInnovation
+from .innovation import Innovations, ShadowInnovation, weights_of
 from .layout import NoisySignal, SignalLayout, Smoothed
-from .noise import spatial_variances
-from .output import fade_out
+from .noise import NO_SAMPLE, PRIOR_VARIANCE, spatial_variances
+from .output import FEWEST_SAMPLES, fade_out
 
 MIN_NOISE = 0.25               # share of the innovation's energy that is at least noise of d
+_FILLED = 0.5                  # samples that what was filtered counts for
+_UNKNOWN = 0.5                 # visibility that nothing is known of
+_LEAST_NOISE = 0.01            # variance of a sample of visibility
+_MOST_SAMPLES = 64.0
+_LEAST_OMEGA = 0.1             # that a lone sample is divided by
 _MIN_ENERGY = 1e-20            # square of a luminance that is taken for 0
 
 
@@ -40,37 +45,71 @@ class Gains(NamedTuple):
 
 
 class Merged(NamedTuple):
-    """The new history of each signal, and `fade_out`."""
+    """The new history of each signal, and `fade_out`, of sparse ones by their samples."""
 
     signals: list[NoisySignal]
     fade: Float
+    sparse_fades: list[Float]
 
 
 def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovations: Innovations,
-          smoothed: Smoothed, plane: TangentPlane, gains: Gains) -> Merged:
+          chosen: Chosen | None, smoothed: Smoothed, plane: TangentPlane, gains: Gains) -> Merged:
     """The new history, and how the last filter fades out with it."""
-    if innovations.shadow is not None:
-        innovations, smoothed = _choose_history(innovations, innovations.shadow, smoothed)
+    if innovations.shadows:
+        innovations, smoothed = _choose_history(innovations, innovations.shadows[0], smoothed)
     is_new = innovations.length < 1.5
-    spatial = spatial_variances(stencil, signals, is_new, plane)
-    merged = []
+    omegas = weights_of(layout, chosen)
+    dense = [s for s, omega in enumerate(omegas) if omega is None]
+    first = [_only_sample(y, omega) for y, omega in zip(signals, omegas) if omega is not None]
+    spatial = spatial_variances(stencil, [signals[s] for s in dense], is_new, plane, first)
+    visible = dict(zip(layout.visibilities, smoothed.visibility_spread, strict=True))
+    merged, sparse_fades = [], []
     for s, (kind, signal) in enumerate(zip(layout.kinds, signals, strict=True)):
         e, wide = innovations.signals[s], [smoothed.diffuse, *smoothed.sharp][s]
-        a, gain = dr.maximum(1 / innovations.length, gains.alphas[s]), gains.sharp_min_gain
+        variance, omega, samples = innovations.variances[s], omegas[s], None
+        alpha, gain = gains.alphas[s], gains.sharp_min_gain
         if kind is SignalKind.DIFFUSE:
             gain = dr.maximum(_certainty(smoothed.diffuse_spread, wide, gains), gains.min_gain)
         elif kind is SignalKind.VISIBILITY:
-            assert smoothed.visibility_spread is not None
-            certain = _certainty(smoothed.visibility_spread, wide, gains)
-            a = dr.maximum(a, gains.change_alpha * certain)
+            certain = _certainty(visible[s], wide, gains)
             gain = dr.maximum(certain, gains.sharp_min_gain)
-        gain = dr.maximum(gain, a)
-        merged_signal = mapped(_merged(gain, a), signal, e, wide)
-        energy, variance = smoothed.energies[s], innovations.variances[s]
-        noise = dr.select(is_new, spatial[s], dr.maximum(energy - variance, energy * MIN_NOISE))
-        merged.append(NoisySignal(merged_signal, dr.fma(dr.square(1 - a), variance,
-                                                        dr.square(a) * noise)))
-    return Merged(merged, fade_out(innovations.length, gains.fade_frames))
+            alpha = dr.maximum(alpha, gains.change_alpha * certain)
+        if omega is None:
+            a = dr.maximum(1 / innovations.length, alpha)
+            merged_signal = mapped(_merged(dr.maximum(gain, a), a), signal, e, wide)
+            energy = smoothed.energies[s]
+            noise = dr.maximum(energy - variance, energy * MIN_NOISE)
+        else:
+            g = s - len(dense)
+            old, change = innovations.sparse[g], _norm(smoothed.weights[g]) * wide.luminance
+            a = dr.minimum(dr.maximum(1 / (old.samples + old.weight + _FILLED), alpha), 1)
+            v = dr.fma(gain, change, old.history)
+            v = dr.fma(a, dr.fma(-old.weight, change, e.luminance), v)
+            alone = dr.select(first[g] >= 0, first[g], _UNKNOWN)
+            merged_signal = Signal(None, dr.select(is_new, alone, v), None)
+            mean = dr.clip(old.history + change, 0, 1)
+            noise = dr.maximum(mean * (1 - mean), _LEAST_NOISE)
+            samples = dr.minimum(old.samples + omega, _MOST_SAMPLES)
+            a = dr.select(is_new, dr.select(omega > 0, type(a)(1), 0), dr.minimum(a * omega, 1))
+            sparse_fades.append(fade_out(samples, gains.fade_frames))
+        noise = dr.select(is_new, spatial[s], noise)
+        variance = dr.fma(dr.square(1 - a), variance, dr.square(a) * noise)
+        if samples is not None:
+            variance = dr.select(samples > FEWEST_SAMPLES, variance, PRIOR_VARIANCE)
+        merged.append(NoisySignal(merged_signal, variance, samples))
+    return Merged(merged, fade_out(innovations.length, gains.fade_frames), sparse_fades)
+
+
+def _only_sample(signal: Signal, omega: Float) -> Float:
+    """V of a sparse signal from one sample, `NO_SAMPLE` where there is none."""
+    v = dr.minimum(signal.luminance / dr.maximum(omega, _LEAST_OMEGA), LARGEST_VISIBILITY)
+    return dr.select(omega > 0, v, NO_SAMPLE)
+
+
+def _norm(weight: Float) -> Float:
+    """1 over a smoothed omega, 0 where hardly a ray came by."""
+    there = weight > FEWEST_SAMPLES
+    return dr.select(there, 1 / dr.select(there, weight, 1), 0)
 
 
 def _merged(gain: Float, a: Float) -> Callable[[Float, Float, Float], Float]:
@@ -81,21 +120,20 @@ def _merged(gain: Float, a: Float) -> Callable[[Float, Float, Float], Float]:
 def _choose_history(innovations: Innovations, shadow: ShadowInnovation,
                     smoothed: Smoothed) -> tuple[Innovations, Smoothed]:
     """With the shadow history of visibility in the place of the other one, where it is better."""
-    excess, energy, shadow_wide = smoothed.excess, smoothed.energies[-1], smoothed.shadow_innovation
-    assert excess is not None
-    assert shadow_wide is not None
+    excess, energy = smoothed.excess[0], smoothed.energies[-1]
     better = excess < 0
     e, wide = innovations.signals[-1], smoothed.sharp[-1]
     e = e._replace(luminance=dr.select(better, shadow.innovation, e.luminance))
-    wide = wide._replace(luminance=dr.select(better, shadow_wide, wide.luminance))
+    wide = wide._replace(luminance=dr.select(better, smoothed.shadow_innovation[0],
+                                             wide.luminance))
     variance = dr.select(better, shadow.variance, innovations.variances[-1])
     energy = dr.maximum(energy + dr.minimum(excess, 0), 0)
     return (innovations._replace(signals=[*innovations.signals[:-1], e],
-                           variances=[*innovations.variances[:-1], variance]),
+                                 variances=[*innovations.variances[:-1], variance]),
             smoothed._replace(sharp=[*smoothed.sharp[:-1], wide],
                               energies=[*smoothed.energies[:-1], energy]))
 
 
 def _certainty(spread: Float, wide: Signal, gains: Gains) -> Float:
-    """c = 1 - k Q / l(S[e])^2."""
+    """c = 1 - k Q / l(S[e])^2. (A ratio's norm is in both.)"""
     return 1 - gains.noise_threshold * spread / dr.maximum(dr.square(wide.luminance), _MIN_ENERGY)

@@ -24,7 +24,7 @@ from onespp.denoise.history.records import RecordState, no_history
 from onespp.denoise.history.reprojection import ReprojectionTests, motion_between, without_images
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
 from onespp.denoise.inputs.shadow_rays import has_shadow_rays, read_shadow_rays
-from onespp.denoise.inputs.signals import USED, SignalKind, read_signals
+from onespp.denoise.inputs.signals import USED, SignalKind, Signals, read_signals
 from onespp.denoise.inputs.surface import Surface, TangentPlane
 from onespp.denoise.jit.arrays import Bool, Color, Float
 from onespp.denoise.jit.fastmath import LOG2E
@@ -150,26 +150,32 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         rays = None
         if self.follow_shadows and light.unshadowed and has_shadow_rays(frame):
             rays = read_shadow_rays(frame, previous, stencil)
-        layout = self._layout(light.kinds, rays is not None)
-        passes = state.passes or Passes.make(stencil, layout)
+        layout = self._layout(light, rays is not None)
+        passes, records = state.passes, state.records
+        if passes is None:
+            passes = Passes.make(stencil, layout)
+            records = no_history(stencil, layout.record_values)
         passes.layout.check(frame, layout)
-        id_ = stencil.Float(sample.id)
-        evaluate(signals, sample, plane, id_, (rays, surface.position) if rays else None)
+        id_, chosen = stencil.Float(sample.id), light.chosen
+        evaluate(signals, sample, plane, id_, (rays, surface.position) if rays else None, chosen)
 
         passes.store_surface(id_, plane)
-        shadows = passes.spread_shadows(rays, sample, surface.position, plane)
+        shadows = passes.spread_shadows(rays, sample, surface.position, plane, chosen)
         innovations = passes.find_innovations(
-            signals, sample, plane, motion, state.records, shadows,
+            signals, chosen, sample, plane, motion, records, shadows,
             *self._reprojection_parameters(stencil))
+        innovations = passes.choose_histories(innovations, plane)
         smoothed = passes.smooth_innovations(innovations, plane)
-        merged = passes.merge(signals, innovations, smoothed, plane, self._gains(stencil, layout))
+        merged = passes.merge(signals, innovations, chosen, smoothed, plane,
+                              self._gains(stencil, layout))
         output = passes.filter_output(merged, innovations, plane, self._sigmas(stencil, layout))
-        records = passes.pack(sample, History(innovations.length, merged.signals))
+        records = passes.pack(sample, History(innovations.length, merged.signals),
+                              output if layout.groups else None)
         return light.color(output), replace(state, passes=passes, records=records,
                                             previous=without_images(frame))
 
-    def _layout(self, kinds: tuple[SignalKind, ...], has_shadow_rays: bool) -> SignalLayout:
-        return SignalLayout(kinds, has_shadow_rays, self.innovation_levels,
+    def _layout(self, light: Signals, has_shadow_rays: bool) -> SignalLayout:
+        return SignalLayout(light.kinds, light.groups, has_shadow_rays, self.innovation_levels,
                             self.sharp_innovation_levels, self.output_levels,
                             self.sharp_output_levels)
 

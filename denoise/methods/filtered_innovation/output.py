@@ -10,25 +10,27 @@ import drjit as dr
 
 from onespp.denoise.filters.atrous import EPSILON
 from onespp.denoise.filters.tangent_plane import BINOMIAL, SurfaceTap, surface_exponent
-from onespp.denoise.inputs.signals import SignalKind
 from onespp.denoise.inputs.surface import TangentPlane
 from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.fastmath import exp2
 from onespp.denoise.jit.structure import mapped
-from onespp.denoise.jit.taps import Taps, window
+from onespp.denoise.jit.taps import Offset, Taps, window
 
 from .layout import NoisySignal, SignalLayout
 from .smoothing import footprint
 
+FEWEST_SAMPLES = 1e-5          # that a sparse signal's pixel counts for where it has none
 _NEVER = -1e3                  # log2 of a weight that is 0
 
 
 class OutputFalloff(NamedTuple):
-    """What weakens the taps of the last filter: `fade_out` of its last level, and visibility's
-    `penumbra.footprint_falloff`, None without shadow rays."""
+    """What weakens the taps of the last filter: `fade_out` of its last level, of signals that are
+    not sparse and of each that is, and `penumbra.footprint_falloff` of each visibility that shadow
+    rays tell of."""
 
     fade: Float
-    footprint: Float | None
+    sparse_fades: list[Float]
+    footprints: list[Float]
 
 
 def output_level(layout: SignalLayout, level: int, values: Taps[list[NoisySignal]],
@@ -40,27 +42,55 @@ def output_level(layout: SignalLayout, level: int, values: Taps[list[NoisySignal
         values: the signals that are left at this level.
         sigmas: sqrt(log2(e)) / sigma of each signal. Others as of `smooth_level`.
     """
-    exponent = surface_exponent(surfaces, plane, spacing)
-    nearer, h0 = footprint(falloff.footprint, spacing), BINOMIAL[0]**2
-    kinds, center = layout.output_level(level), values.at(-1)
-    sums = [NoisySignal(mapped(lambda v: v * h0, c.signal), c.variance * h0**2) for c in center]
+    exponent, h0 = surface_exponent(surfaces, plane, spacing), BINOMIAL[0]**2
+    left, center = layout.output_level(level), values.at(-1)
+    rules = [_Rule.of(layout, s, level, falloff, spacing) for s in left]
+    sums = [_start(c, h0) for c in center]
     scales = [sigma / (dr.sqrt(c.variance) + EPSILON) for c, sigma in zip(center, sigmas)]
-    totals = [type(plane.dx)(h0) for _ in kinds]
+    totals: list[Float] = [type(plane.dx)(h0) if c.samples is None else h0 * c.samples
+                           for c in center]
     for i, offset in enumerate(window(1)):
         taps, surface_x = values.at(i), exponent(i, offset)
-        for s, (kind, tap) in enumerate(zip(kinds, taps, strict=True)):
+        for s, tap in zip(left, taps, strict=True):
             distance = (tap.signal.luminance - center[s].signal.luminance) * scales[s]
-            x = dr.fma(distance, -distance, surface_x)
-            if kind is SignalKind.VISIBILITY:
-                x = nearer(x, offset)
-            w = exp2(x + falloff.fade if layout.is_last_level(kind, level) else x)
-            totals[s] += w
+            x = rules[s].nearer(dr.fma(distance, -distance, surface_x), offset)
+            fade = rules[s].fade
+            w = exp2(x if fade is None else x + fade)
+            samples = sums[s].samples
+            if samples is not None and tap.samples is not None:
+                samples, w = samples + w, w * tap.samples
+            totals[s] = totals[s] + w
             sums[s] = NoisySignal(mapped(_weighted(w), tap.signal, sums[s].signal),
-                                  dr.fma(w * w, tap.variance, sums[s].variance))
+                                  dr.fma(w * w, tap.variance, sums[s].variance), samples)
         values.next()
     norms = [1 / total for total in totals]
-    return [NoisySignal(mapped(_times(norm), noisy.signal), noisy.variance * dr.square(norm))
-            for noisy, norm in zip(sums, norms)]
+    return [NoisySignal(mapped(_times(norm), noisy.signal), noisy.variance * dr.square(norm),
+                        None if noisy.samples is None else total / noisy.samples)
+            for noisy, norm, total in zip(sums, norms, totals)]
+
+
+class _Rule(NamedTuple):
+    """How a signal's taps are weakened: by distance, and at the last level."""
+
+    nearer: Callable[[Float, Offset], Float]
+    fade: Float | None
+
+    @staticmethod
+    def of(layout: SignalLayout, s: int, level: int, falloff: OutputFalloff,
+           spacing: Float) -> _Rule:
+        f, g = layout.follower(s), layout.group(s)
+        fade = falloff.fade if g is None else falloff.sparse_fades[g]
+        return _Rule(footprint(None if f is None else falloff.footprints[f], spacing),
+                     fade if layout.is_last_level(s, level) else None)
+
+
+def _start(center: NoisySignal, h0: float) -> NoisySignal:
+    """The sums with the pixel itself alone; of a sparse signal `samples` is the sum of weights."""
+    if center.samples is None:
+        return NoisySignal(mapped(lambda v: v * h0, center.signal), center.variance * h0**2)
+    w = center.samples * h0
+    return NoisySignal(mapped(lambda v: v * w, center.signal), center.variance * dr.square(w),
+                       type(w)(h0))
 
 
 def _weighted(w: Float) -> Callable[[Float, Float], Float]:
@@ -74,5 +104,5 @@ def _times(factor: Float) -> Callable[[Float], Float]:
 
 def fade_out(length: Float, frames: Float) -> Float:
     """log2 of 1 - (n - 1) / frames, which falls from 1 to 0."""
-    left = 1 - (length - 1) / frames
+    left = dr.minimum(1 - (length - 1) / frames, 1)
     return dr.select(left > 1e-6, dr.log2(dr.maximum(left, 1e-6)), _NEVER)

@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+import drjit as dr
+
 from onespp.denoise.filters.tangent_plane import SurfaceTap
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
 from onespp.denoise.inputs.shadow_rays import ShadowRays
-from onespp.denoise.inputs.signals import Signal
+from onespp.denoise.inputs.signals import Chosen, Signal
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Float, Vector3
 from onespp.denoise.jit.grid import Planes, Stencil
@@ -17,11 +19,11 @@ from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import arrays_of, build, flatten
 from onespp.denoise.jit.taps import Taps, window
 
-from .innovation import Innovations, find_innovations, pack_history, to_smooth
-from .layout import PlaneRule, SignalLayout, Smoothed
+from .innovation import Innovations, choose_histories, find_innovations, pack_history, to_smooth
+from .layout import NoisySignal, PlaneRule, SignalLayout, Smoothed
 from .merging import Merged, merge
-from .output import OutputFalloff, output_level
-from .shadows import Shadows, follow_shadows
+from .output import FEWEST_SAMPLES, OutputFalloff, output_level
+from .shadows import Shadows, follow_shadows, of_each_light
 from .smoothing import smooth_level
 
 _OUTSIDE = -1e15          # 1/z outside the image
@@ -66,9 +68,11 @@ class Passes:
     layout: SignalLayout
     surfaces: Planes
     buffer: Planes
-    follow_shadows: Step[..., Shadows]
+    follow_shadows: Step[..., list[Shadows]]
     spread: Level
     find_innovations: Step[..., Innovations]
+    choice: Level | None
+    choose: Step[..., Innovations]
     smoothing: list[Level]
     merge: Step[..., Merged]
     output: list[Level]
@@ -77,7 +81,8 @@ class Passes:
     @staticmethod
     def make(stencil: Stencil, layout: SignalLayout) -> Passes:
         surfaces = stencil.planes([-1.0, _OUTSIDE, _OUTSIDE])
-        buffer = stencil.planes([0.0] * len(layout.smoothing_rules))
+        spread = [PlaneRule(SPREAD_LEVEL)] * (_SHADOW_PLANES * (layout.groups or 1))
+        buffer = stencil.planes([0.0] * max(len(layout.smoothing_rules), len(spread)))
 
         def smoothing(i: int) -> Level:
             rules = layout.smoothing_level(i)
@@ -85,16 +90,21 @@ class Passes:
                               lambda *a: smooth_level(rules, *a))
 
         def output(i: int) -> Level:
-            kinds = layout.output_level(i)
-            return Level.make(i, buffer, layout.output_planes(kinds), surfaces, _INVERSE_DEPTH,
-                              lambda *a: output_level(layout, i, *a), layout.noisy_signals(kinds))
+            left = layout.output_level(i)
+            return Level.make(i, buffer, layout.output_planes(left), surfaces, _INVERSE_DEPTH,
+                              lambda *a: output_level(layout, i, *a), layout.noisy_signals(left))
 
-        spread = [PlaneRule(SPREAD_LEVEL)] * _SHADOW_PLANES
         return Passes(
-            stencil, layout, surfaces, buffer, Step(lambda *a: follow_shadows(stencil, *a)),
-            Level.make(SPREAD_LEVEL, buffer, _SHADOW_PLANES, surfaces, _INVERSE_DEPTH,
+            stencil, layout, surfaces, buffer,
+            Step(lambda chosen, *a: of_each_light(follow_shadows(stencil, *a), chosen,
+                                                  layout.groups)),
+            Level.make(SPREAD_LEVEL, buffer, len(spread), surfaces, _INVERSE_DEPTH,
                        lambda *a: smooth_level(spread, *a)),
             Step(lambda *a: find_innovations(stencil, layout, *a)),
+            Level.make(SPREAD_LEVEL, buffer, layout.groups, surfaces, _VALID_INVERSE_DEPTH,
+                       lambda *a: smooth_level(spread[:layout.groups], *a))
+            if layout.groups and layout.has_shadow_rays else None,
+            Step(lambda *a: choose_histories(layout, *a)),
             [smoothing(i) for i in range(layout.innovation_levels)],
             Step(lambda *a: merge(stencil, layout, *a)),
             [output(i) for i in range(layout.output_levels)],
@@ -104,23 +114,32 @@ class Passes:
         self.surfaces.store([id_, plane.inverse_depth])
 
     def spread_shadows(self, rays: ShadowRays | None, surface: SurfaceSample, position: Vector3,
-                       plane: TangentPlane) -> Shadows | None:
-        """`follow_shadows`, and means of it over a few pixels around."""
+                       plane: TangentPlane, chosen: Chosen | None) -> list[Shadows]:
+        """`follow_shadows` of each light, and means of it over a few pixels around."""
         if rays is None:
-            return None
-        return self._through([self.spread], self.follow_shadows(rays, surface, position), plane)
+            return []
+        return self._through([self.spread], self.follow_shadows(chosen, rays, surface, position),
+                             plane)
+
+    def choose_histories(self, innovations: Innovations, plane: TangentPlane) -> Innovations:
+        """With the better one of the two histories of each sparse signal; first of what follows."""
+        self.surfaces.store(innovations.valid_inverse_depth, first=_VALID_INVERSE_DEPTH)
+        if self.choice is None:
+            return innovations
+        excess = [shadow.excess for shadow in innovations.shadows]
+        return self.choose(innovations, self._through([self.choice], excess, plane))
 
     def smooth_innovations(self, innovations: Innovations, plane: TangentPlane) -> Smoothed:
         """Q, S and W of the innovation, over pixels that have a history."""
-        self.surfaces.store(innovations.valid_inverse_depth, first=_VALID_INVERSE_DEPTH)
         return self._through(self.smoothing, to_smooth(self.layout, innovations), plane,
-                             innovations.footprint_falloff)
+                             innovations.footprint_falloffs)
 
     def filter_output(self, merged: Merged, innovations: Innovations, plane: TangentPlane,
                       sigmas: list[Float]) -> list[Signal]:
         """The last filter of each signal."""
-        falloff = OutputFalloff(merged.fade, innovations.footprint_falloff)
-        filtered = self._through(self.output, merged.signals, plane, falloff, sigmas)
+        falloff = OutputFalloff(merged.fade, merged.sparse_fades, innovations.footprint_falloffs)
+        filtered = self._through(self.output, [_counted(noisy) for noisy in merged.signals], plane,
+                                 falloff, sigmas)
         return [noisy.signal for noisy in filtered]
 
     def _through(self, levels: list[Level], values: T, plane: TangentPlane,
@@ -134,3 +153,8 @@ class Passes:
         return build(form, planes)
 
 
+def _counted(noisy: NoisySignal) -> NoisySignal:
+    """With how much a sparse signal's pixel counts in the place of its samples."""
+    if noisy.samples is None:
+        return noisy
+    return noisy._replace(samples=dr.clip(noisy.samples, FEWEST_SAMPLES, 1))

@@ -10,9 +10,11 @@ import drjit as dr
 from onespp.denoise.filters.penumbra import PenumbraSample, penumbra_samples
 from onespp.denoise.history.shadow_motion import ShadowMotion, shadow_motion
 from onespp.denoise.inputs.shadow_rays import ShadowRays, stopped
+from onespp.denoise.inputs.signals import Chosen
 from onespp.denoise.inputs.surface import SurfaceSample
 from onespp.denoise.jit.arrays import Vector3
 from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.structure import mapped
 from onespp.denoise.jit.vector import dot, transform
 
 
@@ -33,3 +35,12 @@ def follow_shadows(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
     return Shadows(shadow_motion(stencil, rays, surface, position),
                    penumbra_samples(stencil, blocked, rays.ray.blocker_distance * scale, cosine,
                                     rays.ray.light_id, surface.depth, focal, rays.light_sizes))
+
+
+def of_each_light(shadows: Shadows, chosen: Chosen | None, groups: int) -> list[Shadows]:
+    """What rays tell of each group of lights, nothing where a ray went to another; of all lights
+    where they are one."""
+    if chosen is None:
+        return [shadows]
+    group = chosen.group
+    return [mapped(lambda x, g=g: dr.select(group == g, x, 0), shadows) for g in range(groups)]

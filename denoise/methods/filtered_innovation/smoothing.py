@@ -19,26 +19,31 @@ from .layout import PlaneRule
 
 def smooth_level(rules: Sequence[PlaneRule], values: Taps[list[Float]], surfaces: Taps[SurfaceTap],
                  plane: TangentPlane, spacing: Float,
-                 falloff: Float | None = None) -> list[Float]:
+                 falloffs: Sequence[Float] = ()) -> list[Float]:
     """One level of S, and of Q. The last tap is the pixel itself.
 
     Args:
         rules: of each plane in `values`. spacing: pixels between taps.
-        falloff: `penumbra.footprint_falloff`, for planes that are `within_penumbra`.
+        falloffs: `penumbra.footprint_falloff` of each light that a rule names.
     """
-    exponent, nearer = surface_exponent(surfaces, plane, spacing), footprint(falloff, spacing)
+    exponent = surface_exponent(surfaces, plane, spacing)
+    nearer = [footprint(falloff, spacing) for falloff in falloffs]
+    many = len(falloffs) > 1
+    factors = [decays(falloff, spacing) for falloff in falloffs] if many else []
     h0 = BINOMIAL[0]**2
 
-    def each(wide: Any, within_penumbra: Any) -> list[Any]:
-        """The factor of each plane, of the plane ones and of those within the penumbra."""
-        factors = [within_penumbra if rule.within_penumbra else wide for rule in rules]
-        return [dr.square(f) if rule.squared else f for f, rule in zip(factors, rules)]
+    def each(wide: Any, *near: Any) -> list[Any]:
+        """The factor of each plane, of the plain ones and of those within a penumbra."""
+        each_of = [wide if rule.penumbra is None else near[rule.penumbra] for rule in rules]
+        return [dr.square(f) if rule.squared else f for f, rule in zip(each_of, rules)]
 
-    totals = [type(plane.dx)(h0)] * 2
-    sums = [f * v for f, v in zip(each(h0, h0), values.at(-1), strict=True)]
+    totals = [type(plane.dx)(h0)] * (1 + len(falloffs))
+    sums = [f * v for f, v in zip(each(*[h0] * len(totals)), values.at(-1), strict=True)]
     for i, offset in enumerate(window(1)):
         x = exponent(i, offset)
-        weights = exp2(x), exp2(nearer(x, offset))
+        w = exp2(x)
+        weights = [w, *((w * factor(offset) for factor in factors) if many else
+                        (exp2(within(x, offset)) for within in nearer))]
         sums = [dr.fma(w, v, s) for w, v, s in zip(each(*weights), values.at(i), sums)]
         totals = [t + w for t, w in zip(totals, weights)]
         values.next()
@@ -54,3 +59,11 @@ def footprint(falloff: Float | None, spacing: Float) -> Callable[[Float, Offset]
         return lambda x, _: x
     rate = falloff * dr.square(spacing)
     return lambda x, offset: dr.fma(rate, -float(offset[0]**2 + offset[1]**2), x)
+
+
+def decays(falloff: Float, spacing: Float) -> Callable[[Offset], Float]:
+    """As `footprint`, function of the offset, within 1 pixel, to what a weight is multiplied by:
+    quicker where several lights ask for it."""
+    near = exp2(-falloff * dr.square(spacing))
+    far = dr.square(near)
+    return lambda offset: far if offset[0] and offset[1] else near

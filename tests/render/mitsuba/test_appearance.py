@@ -6,7 +6,7 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from onespp.render.channels import GBUFFER
+from onespp.render.channels import Group, channels_of
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.camera_rays import pixel_rays
 from onespp.render.tracer.renderer import Renderer
@@ -57,7 +57,7 @@ def seen(material: dict, geometry=SQUARE, place=None, eye=(0.3, 0.2, 3)) -> tupl
     scene = Scene("one", "", (Shape("a", geometry, material, place), lamp),
                   Camera(look_at(eye, (0, 0, 0)), 50), 1, WIDTH, HEIGHT, 2)
     renderer = Renderer(scene, HEIGHT, WIDTH)
-    frame = renderer.frame(0, 0, (*GBUFFER, "roughness"))
+    frame = renderer.frame(0, 0, (*channels_of(Group.GUIDES), "roughness"))
     return renderer, frame, frame["id"] == 0
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from onespp.render.channels import FRAME, GLOSS, SHADOW, SPLIT
+from onespp.render.channels import FRAME, GLOSS, SHADOW, SPLIT, UNSHADOWED
 from onespp.render.errors import InputError
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
@@ -78,6 +78,6 @@ def test_they_are_scene_units_wherever_the_scene_is():
 def test_they_need_resampled_light_and_come_with_it():
     with pytest.raises(InputError, match=r"light_id.* need --direct resampled"):
         Renderer(small_scene(), 4, 4).frame(0, channels=SHADOW)
-    for name, more in (("box", ()), ("room", GLOSS)):
+    for name, more in (("box", ()), ("room", ("group", "group_sample", *UNSHADOWED[:2], *GLOSS))):
         channels = Renderer(catalog.load(name), 8, 8, direct="resampled").channels
         assert channels == FRAME + SPLIT + SHADOW + more
