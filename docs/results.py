@@ -37,6 +37,8 @@ from onespp.denoise.score.sequence import score
 from onespp.denoise.studies import hard_scenes as hard_study
 from onespp.denoise.studies.ablation import ablate, variants
 from onespp.denoise.studies.ablation import markdown as ablation_table
+from onespp.denoise.studies.lead import BEST as BEST_FORM
+from onespp.denoise.studies.lead import OIDN_FORMS, peer_in, psnr_of
 from onespp.denoise.studies.lead import markdown as lead_table
 from onespp.render.channels import REPLAY
 from onespp.render.cli.arguments import parse_size
@@ -49,12 +51,15 @@ from onespp.render.files.sequence import FrameSequence
 from onespp.render.files.times import read_times
 from onespp.render.job import RenderJob, render_sequence
 from onespp.scenes import catalog
+from onespp.scenes.generated import KEPT
 from onespp.scenes.hard import HARD
 
 ROOT = Path(__file__).resolve().parents[1]
 PLAIN, OURS = ("mis", "pcg"), ("resampled", "zsobol")  # --direct and --sampler
-SUMMARY = (INPUT, "atrous", "svgf", "oidn-high", "onespp")
+SUMMARY = (INPUT, "atrous", "svgf", "oidn-high", "temporal-oidn-split", "onespp")
 BEST, PEER, RATIO_TO = "onespp", "oidn-high", "oidn-fast"
+STRONGEST = "temporal-oidn-split"  # form of the peer: on our own signals, accumulated
+LIGHT_FRAMES, LIGHT_SIZE = "0:8", "160x108"  # of the kept scenes of all kinds of light
 OTHERS = {  # label -> scene, frames, size, seed: scenes and frames that nothing was tuned on
     "`docs/slow_box.py`: a quarter of the pace": ("docs/slow_box.py", "0:16", "128x128", 5),
     "`box`, frames 60:92:2: twice the pace": ("box", "60:92:2", "128x128", 5),
@@ -123,9 +128,22 @@ class Plan:
             sequence = render(self.data / name, str(ROOT / scene) if scene.endswith(".py")
                               else scene, frames, size, self.others_spp, seed)
             known = all_methods(sequence)
-            denoise(sequence, {m: known[m] for m in (BEST, PEER, "atrous") if m in known},
-                    self.again)
+            denoise(sequence, {m: known[m] for m in (BEST, PEER, STRONGEST, "atrous")
+                               if m in known}, self.again)
             found[label] = scores_of(sequence)
+        return found
+
+    @cached_property
+    def light(self) -> dict[str, Scores]:
+        """Name -> scores of the generated scenes that are kept to check with."""
+        found = {}
+        for name in (catalog.GENERATED[i] for i in KEPT):
+            sequence = render(self.data / name, name, LIGHT_FRAMES, LIGHT_SIZE, self.others_spp, 5,
+                              added=())
+            known = all_methods(sequence)
+            denoise(sequence, {m: known[m] for m in (BEST, "svgf", *OIDN_FORMS) if m in known},
+                    self.again)
+            found[name] = scores_of(sequence)
         return found
 
     @cached_property
@@ -315,19 +333,37 @@ def all_scores(plan: Plan) -> str:
 def lead(plan: Plan) -> str:
     if not all(PEER in s.methods for pair in plan.pairs.values() for s in pair):
         return f"`{PEER}` cannot run on this machine (`pip install pyoidn`)."
-    return (f"{lead_table(BEST, PEER, plan.pairs)}\n\n"
+    return (f"{lead_table(BEST, BEST_FORM, plan.pairs)}\n\n"
             + "; ".join(conditions(pair[1]) for pair in plan.pairs.values())
             + f"; PSNR on {TONE_MAP}.")
 
 
 def others(plan: Plan) -> str:
-    methods = [name for name in (INPUT, BEST, PEER, "atrous")
+    methods = [name for name in (INPUT, BEST, PEER, STRONGEST, "atrous")
                if any(name in scores.methods for scores in plan.others.values())]
     rows = [[label, *(_three(scores.methods.get(name)) for name in methods)]
             for label, scores in plan.others.items()]
     heads = ["on our input: PSNR dB (FLIP, flicker)", *map(named, methods)]
     return (f"{table(heads, rows)}\n\n" + "; ".join(map(conditions, plan.others.values()))
             + f"; PSNR on {TONE_MAP}.")
+
+
+def light(plan: Plan) -> str:
+    columns = (INPUT, "svgf", PEER, STRONGEST, BEST)
+    heads = ["scene", *map(named, columns), "over the best form of OIDN", "flicker, share"]
+    rows, leads = [], []
+    for name, scores in plan.light.items():
+        found = scores.methods
+        cells = [number(found.get(column), "psnr_srgb", ".2f") for column in columns]
+        if any(form in found for form in OIDN_FORMS):
+            peer, ours = found[peer_in(scores, BEST_FORM, name)], found[BEST]
+            leads.append(psnr_of(ours) - psnr_of(peer))
+            a, b = ours["flicker"], peer["flicker"]
+            cells += [f"{leads[-1]:+.2f}", f"{a / b:.2f}" if a and b else ""]
+        rows.append([f"`{name}`", *cells])
+    mean = f" Mean lead {np.mean(leads):+.2f} dB, least {min(leads):+.2f}." if leads else ""
+    return (f"{table(heads, rows)}\n\nPSNR in dB on {TONE_MAP}, mean over frames {LIGHT_FRAMES} at "
+            f"{LIGHT_SIZE}, references {plan.others_spp} spp in halves, seed 5.{mean}")
 
 
 def _three(score: MethodScore | None) -> str:
@@ -373,6 +409,7 @@ PARTS: dict[str, tuple[Path, Callable[[Plan], str]]] = {
     "scores": (ROOT / "docs/results.md", all_scores),
     "lead": (ROOT / "docs/results.md", lead),
     "others": (ROOT / "docs/results.md", others),
+    "light": (ROOT / "docs/results.md", light),
     "ablation": (ROOT / "docs/results.md", ablation),
     "hard-onespp": (ROOT / "docs/results.md", hard_of_best),
     "hard": (ROOT / "docs/results.md", hard),
@@ -393,7 +430,7 @@ def replaced(page: str, name: str, new: str) -> str:
 
 def own_command(name: str, plan: Plan) -> str:
     """The command line that prints a part."""
-    if name == "others":
+    if name in ("others", "light"):
         given = f"--others-spp {plan.others_spp}"
     elif name.startswith("hard"):
         given = f"--hard-spp {plan.hard_spp}" + "".join(
