@@ -271,12 +271,15 @@ def frames_text(frames: list[int]) -> str:
 
 def conditions(scores: Scores) -> str:
     """What numbers of a sequence stand on, with the score of its own input."""
-    noisy, flip = scores.methods[INPUT]["psnr_srgb"], scores.flip_floor
+    noisy, flip, floor = (scores.methods[INPUT]["psnr_srgb"], scores.flip_floor,
+                          scores.reference_floor_db)
+    if scores.reference_halves:
+        known = "in halves" + (f" (floor of FLIP {flip:.3f})" if flip is not None else "")
+    else:
+        known = f"(noise floor {floor:.1f} dB)" if floor is not None else "(noise floor not known)"
     return (f"`{scores.scene}`: frames {frames_text(scores.frames)} at {scores.size[0]}x"
-            f"{scores.size[1]}, reference {scores.reference_spp} spp in halves ("
-            + (f"floor of FLIP {flip:.3f}" if flip is not None else "floor of FLIP not known")
-            + f"), seed {scores.seed}, input "
-            + (f"{noisy:.2f} dB" if noisy is not None else "without a score"))
+            f"{scores.size[1]}, reference {scores.reference_spp} spp {known}, seed {scores.seed}, "
+            "input " + (f"{noisy:.2f} dB" if noisy is not None else "without a score"))
 
 
 def machine_of(plan: Plan) -> str:
@@ -449,11 +452,11 @@ def own_command(name: str, plan: Plan) -> str:
               help="Frames of box and room.")
 @click.option("--box-size", default="256x256", show_default=True, metavar="WxH")
 @click.option("--room-size", default="320x180", show_default=True, metavar="WxH")
-@click.option("--reference-spp", default=256, show_default=True, metavar="N",
+@click.option("--reference-spp", default=64, show_default=True, metavar="N",
               help="Of box and room.")
-@click.option("--others-spp", default=128, show_default=True, metavar="N",
-              help="Of the scenes that nothing was tuned on.")
-@click.option("--hard-spp", default=128, show_default=True, metavar="N",
+@click.option("--others-spp", default=64, show_default=True, metavar="N",
+              help="Of the scenes that nothing was tuned on, and of all kinds of light.")
+@click.option("--hard-spp", default=64, show_default=True, metavar="N",
               help="Of the hard scenes.")
 @click.option("--seed", default=0, show_default=True, metavar="N", help="Of box and room.")
 @click.option("--hard", "hard_names", multiple=True, metavar="NAME", type=click.Choice([*HARD]),

@@ -27,7 +27,7 @@ from onespp.render.files.atomic import write_text
 from onespp.render.files.frame_ranges import format_frames
 from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.files.times import read_times
-from onespp.render.progress import Progress
+from onespp.render.progress import Progress, silent
 
 from .bias_variance import check_seeds, split_errors
 from .commands import commands
@@ -42,7 +42,7 @@ MOST_LOST = 0.01
 
 
 def score(sequence: FrameSequence, methods: list[str] | None = None,
-          progress: Progress | None = None, seeds: list[FrameSequence] | None = None,
+          progress: Progress = silent, seeds: list[FrameSequence] | None = None,
           command: str = "") -> Scores:
     """Score a sequence, and write scores.json and scores.csv into its folder.
 
@@ -51,7 +51,7 @@ def score(sequence: FrameSequence, methods: list[str] | None = None,
 
     Args:
         methods: which to score beside the input; default: all that have results.
-        progress: called with (done, total, what).
+        progress: counts frames.
         seeds: renders of the same with other seeds, to split errors by (`bias_variance.py`).
         command: the command line, for scores.json.
 
@@ -77,7 +77,7 @@ def score(sequence: FrameSequence, methods: list[str] | None = None,
 
 
 def measure_sequence(sequence: FrameSequence, methods: list[str] | None = None,
-                     progress: Progress | None = None) -> Scores:
+                     progress: Progress = silent) -> Scores:
     """The scores alone; arguments and errors as for `score`."""
     names = _methods(sequence, methods)
     frames = [i for i in sequence.frames if sequence.has_frame(i)]
@@ -104,8 +104,7 @@ def measure_sequence(sequence: FrameSequence, methods: list[str] | None = None,
                                  runs[name].ms.get(number), metrics)
                 seen.append(name)
         paired.add({name: e for name in seen if (e := scorers[name].headline) is not None})
-        if progress:
-            progress(n + 1, len(frames), "score")
+        progress(n + 1, len(frames), "score")
     times = read_times(sequence.folder)
     methods_scored = {name: _summary(judge, scorers[INPUT], cost(sequence, runs.get(name), times))
                       for name, judge in scorers.items()}

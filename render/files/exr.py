@@ -36,6 +36,7 @@ _MAGIC = b"\x76\x2f\x31\x01"
 _TYPES = (np.dtype(np.uint32), np.dtype(np.float16), np.dtype(np.float32))
 _ROWS = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32}  # rows a chunk: none, RLE, ZIPS, ZIP, PIZ
 _MAX_SIDE = 1 << 16
+MOST_NAMED = 24  # channels in one sentence
 _MAX_RATIO = 1100  # deflate, the strongest of these, cannot exceed 1032
 
 
@@ -109,8 +110,10 @@ def read_exr(path: Path, channels: Iterable[str] | None = None,
     names = list(header.channels if channels is None else channels)
     missing = [name for name in names if name not in header.channels]
     if missing:
-        raise InputError(f"{path} lacks the channel {', '.join(missing)} "
-                         f"(it has {', '.join(map(repr, header.channels))})")
+        there = sorted(header.channels)
+        more = f" and {len(there) - MOST_NAMED} more" if len(there) > MOST_NAMED else ""
+        raise InputError(f"{path} lacks the channel {', '.join(missing[:MOST_NAMED])} "
+                         f"(it has {', '.join(map(repr, there[:MOST_NAMED]))}{more})")
     images = _decode(path, data, header, names)
     return images, header
 

@@ -36,6 +36,7 @@ from onespp.denoise.report.speed_error_plot import pareto_front, plot_speed_agai
 from onespp.denoise.score.scorecard import INPUT
 from onespp.denoise.score.sequence import measure_sequence, score
 from onespp.render.errors import InputError
+from onespp.render.progress import silent
 from tests.support.made_sequence import COUNT, HEIGHT, WIDTH, make_sequence, truth
 
 
@@ -45,7 +46,7 @@ def drawn(tmp_path_factory):
     return sequence, draw(sequence)
 
 
-def draw(sequence, progress=None):
+def draw(sequence, progress=silent):
     """Scores, with what drawing them noted."""
     scores = score(sequence, progress=progress)
     trouble = draw_pictures(sequence, scores, progress=progress)
@@ -98,7 +99,7 @@ def test_sheets_of_frames_that_are_no_longer_chosen_go(tmp_path):
 def test_progress_counts_up_to_the_total(tmp_path):
     told = []
     sequence = make_sequence(tmp_path / "made", methods=False)
-    draw(sequence, progress=lambda done, total, what: told.append((done, total, what)))
+    draw(sequence, progress=lambda done, total, what, note="": told.append((done, total, what)))
     drawing = [(done, total) for done, total, what in told if what == "pictures"]
     assert drawing == [(i + 1, len(drawing)) for i in range(len(drawing))]
 

@@ -29,7 +29,7 @@ def sequence(tmp_path):
 
 def test_results_are_those_of_the_method_called_frame_by_frame(sequence):
     seen = []
-    run = denoise_sequence(sequence, Temporal(), "temporal", lambda done, ms: seen.append(done))
+    run = denoise_sequence(sequence, Temporal(), "temporal", lambda done, *_: seen.append(done))
     method = Temporal()
     state = method.init(H, W)
     for i in range(FRAMES):
