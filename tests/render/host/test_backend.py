@@ -136,11 +136,15 @@ def test_denoise_imports_no_renderer():
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a folder that is used cannot be removed")
 def test_a_working_directory_that_is_gone_is_one_sentence(tmp_path):
-    """Mitsuba's import ended the process: SIGABRT."""
+    """Mitsuba's import ended the process: SIGABRT.
+
+    `sys.path` begins with a folder, as that of the console script; with the "" of `python -c`
+    NumPy 2.5 itself is not imported.
+    """
     gone = tmp_path / "gone"
     gone.mkdir()
-    program = (f"import os; os.chdir({str(gone)!r}); os.rmdir({str(gone)!r})\n"
-               f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
+    program = (f"import os, sys; sys.path[0] = {str(ROOT)!r}\n"
+               f"os.chdir({str(gone)!r}); os.rmdir({str(gone)!r})\n"
                "from onespp.cli import main; sys.argv[1:] = ['render', 'box', '--size', '4x4', "
                f"'--out', {str(tmp_path / 'o')!r}]; main()")
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True,
