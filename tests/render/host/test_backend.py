@@ -138,8 +138,8 @@ def test_denoise_imports_no_renderer():
 def test_a_working_directory_that_is_gone_is_one_sentence(tmp_path):
     """Mitsuba's import ended the process: SIGABRT.
 
-    From a file, as the console script is: by `python -c` Python 3.13 itself fails where an attribute
-    is missing, since it looks for modules of the same name in the working directory.
+    From a file, as the console script is: by `python -c` Python 3.13 itself fails where an
+    attribute is missing, since it looks for modules of its name in the working directory.
     """
     gone = tmp_path / "gone"
     gone.mkdir()
