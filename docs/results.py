@@ -273,7 +273,7 @@ def frames_text(frames: list[int]) -> str:
 def conditions(scores: Scores) -> str:
     """What numbers of a sequence stand on, with the score of its own input."""
     noisy, flip, floor = (scores.methods[INPUT]["psnr_srgb"], scores.flip_floor,
-                          scores.reference_floor_db)
+                          scores.headline_floor)
     if scores.reference_halves:
         known = "in halves" + (f" (floor of FLIP {flip:.3f})" if flip is not None else "")
     else:

@@ -148,6 +148,6 @@ def _images(sequence: FrameSequence, scores: Scores, frame: int,
             yield method, value(method), sequence.read_result(method, frame)
     if sequence.has_reference(frame):
         reference = sequence.read_reference(frame)
-        floor = scores.reference_floor_per_frame.get(frame)
+        floor = scores.headline_floors.get(frame)
         cap = "" if floor is None else f", noise floor {floor:.1f} {HEADLINE.unit}"
         yield "reference", f"{reference.spp or 'unknown'} spp{cap}", reference.color

@@ -39,10 +39,8 @@ def page_data(sequence: FrameSequence, scores: Scores, channels: list[str],
         "scene": scores.scene, "frames": scores.frames, "width": manifest.width,
         "height": manifest.height, "fps": manifest.fps, "hasReference": scores.has_reference,
         "references": [i for i in scores.frames if sequence.has_reference(i)],
-        # No score by halves stops at the floor, so no chart shows it.
-        "floor": None if scores.reference_halves else scores.reference_floor_db,
-        "floors": [None if scores.reference_halves else scores.reference_floor_per_frame.get(i)
-                   for i in scores.frames],
+        "floor": scores.headline_floor,
+        "floors": [scores.headline_floors.get(i) for i in scores.frames],
         "headline": HEADLINE.name, "toneMap": scores.tone_map,
         "metrics": [_metric(m, scores) for m in metrics],
         "methods": [_method(sequence, scores, name, metrics, histograms.get(name))
@@ -82,7 +80,6 @@ def _method(sequence: FrameSequence, scores: Scores, name: str, metrics: list[Me
         "ms": method.ms_per_frame, "inTurns": method.interleaved,
         "values": {m.name: method[m.name] for m in metrics},
         "errors": method.errors, "bounds": method.bounds,
-        "paired": scores.paired_errors.get(name, {}),
         "perFrame": {m.name: over_frames(m.name) for m in metrics},
         "frames": [i for i in scores.frames if i in rows],
         "classes": {key: {name: {**row.model_dump(), "mse_share": max(0.0, row.mse_share)}
@@ -195,9 +192,9 @@ def highlights(scores: Scores) -> list[dict[str, str]]:
         tiles.append({"label": "Reference", "value": f"{scores.reference_spp} spp, two halves",
                       "about": f"{HEADLINE.label} is known to ±{error:.2f} {HEADLINE.unit} or "
                                "better"})
-    elif scores.reference_floor_db is not None:
+    elif scores.headline_floor is not None:
         tiles.append({"label": "Noise floor of the reference",
-                      "value": f"{scores.reference_floor_db:.1f} {HEADLINE.unit}",
+                      "value": f"{scores.headline_floor:.1f} {HEADLINE.unit}",
                       "about": f"{scores.reference_spp} spp; a perfect image would score this"})
     samples = "" if scores.spp is None else (
         f" at {scores.spp} sample{'s' if scores.spp > 1 else ''} a pixel")

@@ -104,8 +104,8 @@ def _levels(axes, scores: Scores, best: float) -> None:
     noisy = scores.methods[INPUT][HEADLINE.name] if INPUT in scores.methods else None
     if noisy is not None:
         line(noisy, (0, (6, 3)), f"input, {noisy:.1f} dB")
-    floor = scores.reference_floor_db
-    if floor is None or scores.reference_halves:  # no score by halves stops at it
+    floor = scores.headline_floor
+    if floor is None:
         return
     if floor < best + FAR:
         line(floor, (0, (1, 2)), f"reference's noise floor, {floor:.1f} dB")

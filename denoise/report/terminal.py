@@ -108,9 +108,9 @@ def caption(scores: Scores) -> str:
             parts[-1] += f" in two halves, {HEADLINE.label} free of its noise but for ±"
             if scores.flip_floor is not None:
                 parts.append(f"a perfect image would have FLIP {scores.flip_floor:.4f}")
-        elif scores.reference_floor_db is not None:
+        elif scores.headline_floor is not None:
             parts[-1] += (f", whose own noise caps {HEADLINE.label} at "
-                          f"{scores.reference_floor_db:.1f} {HEADLINE.unit}")
+                          f"{scores.headline_floor:.1f} {HEADLINE.unit}")
     return "; ".join([*parts, "time: median after the first frame, without files"]) + "."
 
 

@@ -176,6 +176,17 @@ class Scores(JsonFile):
     def has_reference(self) -> bool:
         return self.methods[INPUT][HEADLINE.name] is not None
 
+    @property
+    def headline_floor(self) -> float | None:
+        """dB at which noise of the reference stops the headline; None by halves, which it does
+        not stop, and where it is not known."""
+        return None if self.reference_halves else self.reference_floor_db
+
+    @property
+    def headline_floors(self) -> dict[int, float]:
+        """The same by frame; of those where it is known."""
+        return {} if self.reference_halves else self.reference_floor_per_frame
+
     def label(self, name: str) -> str:
         """A method's name for a table, with what ran where that is something else."""
         ran = self.methods[name].method

@@ -82,7 +82,7 @@ def lead(scene: str, scores: Scores, method: str, peers: Iterable[str]) -> Lead:
     ours, other = (scores.methods[name]["flicker"] for name in (method, best))
     share = ours / other if ours is not None and other else None
     return Lead(scene, psnr_of(scores.methods[method]), best, psnr_of(scores.methods[best]), share,
-                scores.reference_floor_db)
+                scores.headline_floor)
 
 
 def class_leads(cases: Iterable[Scores], method: str,

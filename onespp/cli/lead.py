@@ -73,11 +73,12 @@ def _pairs(folders: tuple[Path, ...], method: str, peer: str) -> None:
     scenes = {folder.name: (a, b) for folder, a, b in zip(folders[1::2], read[::2], read[1::2])}
     click.echo(markdown(method, peer, scenes))
     for name, (plain, ours) in scenes.items():
-        floor = ours.reference_floor_db
+        floor = ours.headline_floor
         on_plain, on_ours = (peer_in(scores, peer, name) for scores in (plain, ours))
         click.echo(f"\n{name}: {len(ours.frames)} frames of {ours.size[0]}x{ours.size[1]}, "
-                   f"reference {ours.reference_spp or 'of unknown'} spp, floor "
-                   + (f"{floor:.1f} dB" if floor is not None else "not known")
+                   f"reference {ours.reference_spp or 'of unknown'} spp"
+                   + (" in halves" if ours.reference_halves else
+                      f", floor {floor:.1f} dB" if floor is not None else ", floor not known")
                    + "".join(f"; {key} {psnr_of(s.methods[key]):.2f} dB{where}"
                              for s, key, where in ((plain, "input", " (plain)"),
                                                    (plain, on_plain, " (plain)"),

@@ -13,6 +13,7 @@ from onespp.denoise.geometry.correspondence import GUIDES
 from onespp.denoise.metrics.errors import PSNR_CAP, psnr
 from onespp.denoise.metrics.table import ESTIMATED, HEADLINE
 from onespp.denoise.metrics.tonemap import srgb_from_linear
+from onespp.denoise.report import contact_sheets
 from onespp.denoise.report.page_data import page_data, table_data
 from onespp.denoise.report.terminal import caption, cells
 from onespp.denoise.score.causes import CAUSES
@@ -159,6 +160,18 @@ def test_tables_and_page_show_the_error(sequence, scores):
     found = next(m for m in data["methods"] if m["name"] == "fine")
     assert found["errors"] == fine.errors
     assert data["floor"] is None
+
+
+def test_a_sheet_tells_the_floor_of_references_without_halves_alone(sequence, scores):
+    """By halves a result may be better than the mean of the reference."""
+    plain = measure_sequence(sequence)
+    assert scores.reference_floor_db is not None
+    assert (scores.headline_floor, scores.headline_floors) == (None, {})
+    assert (plain.headline_floor, plain.headline_floors) == (
+        plain.reference_floor_db, plain.reference_floor_per_frame)
+    for made, found, told in ((halved(sequence, truth), scores, False), (sequence, plain, True)):
+        *_, (name, label, _) = contact_sheets._images(made, found, 0, [])
+        assert (name, "noise floor" in label) == ("reference", told)
 
 
 def test_a_single_frame_is_compared_by_the_errors_of_its_reference(scores):
