@@ -35,9 +35,9 @@ from onespp.denoise.oracles import filtered_innovation as innovation_oracle
 from onespp.denoise.oracles import filters as oracles
 from onespp.denoise.oracles import svgf as svgf_oracles
 from onespp.denoise.peers.oidn import AVAILABLE, Oidn
-from onespp.denoise.run.timed import timed
 from onespp.render.frame import Frame
 from onespp.render.host import backend
+from onespp.render.host.timed import timed
 from onespp.render.progress import Progress, silent
 
 from . import machine_limits as limits

@@ -8,7 +8,7 @@ from typing import Any
 import drjit as dr
 
 from onespp.denoise.jit.grid import Stencil
-from onespp.denoise.run.timed import timed
+from onespp.render.host.timed import timed
 
 _REPEATS = 5
 _CHAINS, _STEPS = 12, 64  # independent FMAs in flight, and how often each runs

@@ -21,9 +21,8 @@ from onespp.render.files.sequence import FrameSequence
 from onespp.render.files.times import MethodTime, Times
 from onespp.render.host import backend
 from onespp.render.host.machine import machine
+from onespp.render.host.timed import timed
 from onespp.render.progress import Progress, silent
-
-from .timed import timed
 
 
 def time_methods(sequence: FrameSequence, methods: Mapping[str, Method], frames: int = 4,

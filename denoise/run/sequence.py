@@ -33,11 +33,11 @@ from onespp.render.files.sequence import FrameSequence
 from onespp.render.frame import Frame
 from onespp.render.host import backend
 from onespp.render.host.machine import machine
+from onespp.render.host.timed import timed
 from onespp.render.host.versions import versions
 from onespp.render.progress import Progress, silent
 
 from .peak_memory import PeakMemory
-from .timed import timed
 
 ALONE = 8  # frames that nothing else runs beside
 

@@ -19,14 +19,13 @@ which is how many times less error (squared) it has at equal time, or less time 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
-import drjit as dr
 import numpy as np
 
+from onespp.render.host.timed import timed
 from onespp.render.progress import Progress, silent
+from onespp.render.srgb import srgb_from_linear
 from onespp.render.tracer.candidates import candidates_for
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Scene
@@ -46,7 +45,7 @@ class Measured:
 
     def variance(self) -> float:
         """V."""
-        shown = _srgb(self.images)
+        shown = srgb_from_linear(self.images)
         return float(shown.var(axis=0, ddof=1, dtype=np.float64).mean()) * self.samples
 
     def time(self) -> float:
@@ -94,12 +93,12 @@ def compare(name: str, ours: Measured, theirs: Measured, lights: int,
 
 
 def measure(scene: Scene, height: int, width: int, spp: int, renders: int,
-            report: Progress = silent) -> Efficiency:
+            progress: Progress = silent) -> Efficiency:
     """Measure one scene at the middle of its animation.
 
     Args:
         spp: samples of each render, ours and theirs. renders: of each, 3 or more.
-        report: told of each round of renders.
+        progress: told of each round of renders.
     """
     renderer = Renderer(scene, height, width)
     frame = scene.frames // 2
@@ -108,16 +107,17 @@ def measure(scene: Scene, height: int, width: int, spp: int, renders: int,
     renderer.sample_sum(frame, 0, 0, 1)  # compiles: the number of samples is no part of a kernel
     path.render(0, spp)
     images: tuple[list, list] = ([], [])
-    seconds: tuple[list, list] = ([], [])
+    milliseconds: tuple[list, list] = ([], [])
     for k in range(1, renders + 1):
-        image, took = _timed(lambda k=k: renderer.sample_sum(frame, 0, k, spp) / spp)
+        image, took = timed(lambda k=k: renderer.sample_sum(frame, 0, k, spp) / spp)
         images[0].append(image)
-        seconds[0].append(took)
-        _, took = _timed(lambda k=k: path.render(k, spp))
+        milliseconds[0].append(took)
+        _, took = timed(lambda k=k: path.render(k, spp))
         images[1].append(path.through_centres(k, spp))
-        seconds[1].append(took)
-        report(k, renders, scene.name)
-    ours, theirs = (Measured(np.stack(i), np.array(s), spp) for i, s in zip(images, seconds))
+        milliseconds[1].append(took)
+        progress(k, renders, scene.name)
+    ours, theirs = (Measured(np.stack(i), 1e-3 * np.array(ms), spp)
+                    for i, ms in zip(images, milliseconds))
     mi_scene = renderer.stage.mi_scene
     return compare(scene.name, ours, theirs, len(mi_scene.emitters()), candidates_for(mi_scene))
 
@@ -127,16 +127,3 @@ def size_of(scene: Scene, pixels: int) -> tuple[int, int]:
     height = max(1, round(math.sqrt(pixels * scene.height / scene.width)))
     return height, max(1, round(pixels / height))
 
-
-def _timed(render: Callable[[], np.ndarray]) -> tuple[np.ndarray, float]:
-    dr.sync_thread()
-    started = time.perf_counter()
-    image = render()
-    dr.sync_thread()
-    return image, time.perf_counter() - started
-
-
-def _srgb(linear: np.ndarray) -> np.ndarray:
-    """Clipped sRGB (IEC 61966-2-1:1999); scores have their own, which rendering knows not."""
-    x = np.clip(linear, 0, 1)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import time
-
-import drjit as dr
 import numpy as np
 
+from onespp.render.host.timed import timed
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
@@ -30,9 +28,6 @@ def time_frames(scene_name: str, side: int, repeats: int) -> tuple[list[float], 
     times: tuple[list[float], list[float]] = ([], [])
     for seed in range(WARM_UP + repeats):
         for render, into in zip((lambda k: renderer.frame(0, k), theirs), times):
-            dr.sync_thread()
-            started = time.perf_counter()
-            render(seed)
-            dr.sync_thread()
-            into.append(1e3 * (time.perf_counter() - started))
+            _, took = timed(lambda render=render, seed=seed: render(seed))
+            into.append(took)
     return times[0][WARM_UP:], times[1][WARM_UP:]

@@ -44,7 +44,7 @@ def test_files_are_read_and_written_beside_the_calls(sequence, monkeypatch):
     one after another, they would wait for ever."""
     begun, been_read = ([threading.Event() for _ in range(FRAMES)] for _ in range(2))
     last, clock = FRAMES - 1, Clock()
-    clock.put_into(monkeypatch, "onespp.denoise.run.sequence", "onespp.denoise.run.timed")
+    clock.put_into(monkeypatch, "onespp.denoise.run.sequence", "onespp.render.host.timed")
     read, write = FrameSequence.read_frame, FrameSequence.write_result
 
     def reading(self, index, *arguments):

@@ -25,7 +25,7 @@ CLOCK = Clock()
 @pytest.fixture(autouse=True)
 def clock(monkeypatch):
     """The time that passes is what `Sleeper` says."""
-    CLOCK.put_into(monkeypatch, "onespp.denoise.run.timed")
+    CLOCK.put_into(monkeypatch, "onespp.render.host.timed")
     return CLOCK
 
 

@@ -2,7 +2,7 @@
 
 from types import SimpleNamespace
 
-from onespp.denoise.run.timed import timed
+from onespp.render.host.timed import timed
 
 
 def test_the_clock_is_read_when_no_kernel_is_at_work(monkeypatch):
@@ -23,7 +23,7 @@ def test_the_clock_is_read_when_no_kernel_is_at_work(monkeypatch):
         said.append("clock")
         return clock[0]
 
-    monkeypatch.setattr("onespp.denoise.run.timed.dr", SimpleNamespace(sync_thread=sync))
-    monkeypatch.setattr("onespp.denoise.run.timed.time", SimpleNamespace(perf_counter=now))
+    monkeypatch.setattr("onespp.render.host.timed.dr", SimpleNamespace(sync_thread=sync))
+    monkeypatch.setattr("onespp.render.host.timed.time", SimpleNamespace(perf_counter=now))
     assert timed(call) == ("image", 2500.0)
     assert said == ["sync", "clock", "call", "sync", "clock"]
