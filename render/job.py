@@ -109,12 +109,12 @@ class RenderJob:
 
 
 def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
-                    report: Progress = silent,
+                    progress: Progress = silent,
                     tell: Callable[[str], None] = lambda sentence: None) -> FrameSequence:
     """Render what the folder does not hold yet.
 
     Args:
-        report: told of the frames that are done, and of the references, in fractions.
+        progress: told of the frames that are done, and of the references, in fractions.
         tell: told what references of a wanted error are expected to cost, before they are rendered.
 
     Raises:
@@ -140,16 +140,17 @@ def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
                 hand_over(sequence.write_frame,  # (a name here would keep a third frame alive)
                           job.renderer.frame(index, job.seed, job.channel_names()),
                           provenance | {"frame": str(index), "spp": "1"})
-            report(done, count, what)
+            progress(done, count, what)
     if spp is not None:
         references = References(job.renderer, sequence, job.seed, job.antialias, provenance)
         what = f"reference, {spp} spp"
         if job.reference_error is not None:
-            references.grow_to_error(job.frames, job.reference_error, report, tell)
-        for done, index in enumerate(job.frames if job.reference_error is None else ()):
-            references.grow(index, spp, lambda part, whole, *_, done=done: report(
-                done + part / whole, count, what))
-            report(done + 1, count, what)
+            references.grow_to_error(job.frames, job.reference_error, progress, tell)
+        else:
+            for done, index in enumerate(job.frames):
+                references.grow(index, spp, lambda part, whole, *_, done=done: progress(
+                    done + part / whole, count, what))
+                progress(done + 1, count, what)
         sequence = sequence.with_reference_spp()
     return sequence
 

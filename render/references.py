@@ -58,7 +58,7 @@ class References:
     provenance: Mapping[str, str]
 
     def grow(self, index: int, spp: int,
-             report: Progress = silent) -> None:
+             progress: Progress = silent) -> None:
         """Render a frame's reference, if there is none of so many samples (a multiple of 4).
 
         It goes on from one of fewer samples, and from what an interrupt left; its own progress is
@@ -74,14 +74,14 @@ class References:
 
         def after_pass(done: float, total: float, what: str, note: str = "", /) -> None:
             nonlocal saved
-            report(done, total, what)
+            progress(done, total, what)
             if time.monotonic() - saved > SECONDS_BETWEEN_SAVES:
                 self._save(index, sums)
                 saved = time.monotonic()
 
         try:
             reference = render_reference(self.renderer, index, self.seed, spp,
-                                         antialias=self.antialias, sums=sums, report=after_pass)
+                                         antialias=self.antialias, sums=sums, progress=after_pass)
         except KeyboardInterrupt:
             if any(sums.samples):
                 self._save(index, sums)
@@ -92,7 +92,7 @@ class References:
         self.sequence.remove_partial(index)
 
     def grow_to_error(self, frames: Sequence[int], decibels: float,
-                      report: Progress = silent,
+                      progress: Progress = silent,
                       tell: Callable[[str], None] = lambda sentence: None) -> None:
         """Render and double references until the headline is known to `decibels`.
 
@@ -101,7 +101,7 @@ class References:
         could tell; those of FEWEST_SPP or more are kept and left out.
 
         Args:
-            report: told of the frames that are done, as far as can be foreseen.
+            progress: told of the frames that are done, as far as can be foreseen.
             tell: told what it is expected to cost, and that not more can be had.
         """
         what, count = f"reference, to {decibels:g} dB", len(frames)
@@ -109,13 +109,13 @@ class References:
         noises: dict[int, FrameNoise] = {}
         there = [i for i in growing if self._samples(i)] or growing[:1]
         for index in there:
-            self.grow(index, _PILOT_SPP, lambda done, total, *_: report(0, count, what))
+            self.grow(index, _PILOT_SPP, lambda done, total, *_: progress(0, count, what))
             self._measure(index, noises)
         self._tell_cost(growing, noises, decibels, tell)
 
         def grow(index: int, spp: int, target: int) -> None:
             others = sum(noise.spp for i, noise in noises.items() if i != index)
-            self.grow(index, spp, lambda done, total, *_: report(
+            self.grow(index, spp, lambda done, total, *_: progress(
                 count * min((others + done) / target, 0.99), count, what))  # 1 is for the end
             self._measure(index, noises)
 
@@ -129,7 +129,7 @@ class References:
         if (reached := standard_error(noises.values())) > decibels:
             tell(f"references end at {MOST_SPP} samples a pixel: the PSNR of a method of 40 dB is "
                  f"known to {reached:.2g} dB, not {decibels:g}")
-        report(count, count, what)
+        progress(count, count, what)
 
     def _measure(self, index: int, noises: dict[int, FrameNoise]) -> None:
         reference = self.sequence.read_reference(index)

@@ -59,7 +59,7 @@ def _judge_hard(name: str, out: Path, reference_spp: int, report: Progress) -> l
                     reference_spp=reference_spp)
     needed = {channel for method in METHODS.values() for channel in method.needs}
     job = replace(job, channels=tuple(dict.fromkeys((*job.channel_names(), *sorted(needed)))))
-    sequence = render_sequence(job, out / name, report=report)
+    sequence = render_sequence(job, out / name, progress=report)
     for note in reference_notes(sequence, sequence.frames, reference_spp):
         click.echo(f"{name}: {note}", err=True)
     return judge(sequence, name, hard.event, hard.diffuse, report)

@@ -55,7 +55,7 @@ def render_to(scene_name: str, out: Path | None, *, frames: str | None = None,
                     half, reference_error)
     out = out or Path("data") / scene.name
     with writing(out, "render", alone=overwrite), progress() as report:
-        sequence = render_sequence(job, out, overwrite=overwrite, report=report, tell=note)
+        sequence = render_sequence(job, out, overwrite=overwrite, progress=report, tell=note)
     if job.fewest_spp is not None:
         for sentence in reference_notes(sequence, numbers, reference_spp):
             click.echo(sentence)

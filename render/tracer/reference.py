@@ -105,7 +105,7 @@ def next_pass(samples: Sequence[int], end: int, pixels: int) -> tuple[int, int] 
 
 def render_reference(renderer: Renderer, index: int, seed: int, spp: int, *,
                      antialias: bool = False, sums: SampleSums | None = None,
-                     report: Progress = silent) -> Reference:
+                     progress: Progress = silent) -> Reference:
     """The reference of one frame.
 
     Args:
@@ -113,7 +113,7 @@ def render_reference(renderer: Renderer, index: int, seed: int, spp: int, *,
         sums: what an earlier, interrupted call had done; the result has the same bytes as an
             undisturbed one. Where a part has more samples than asked for, all get as many. It is
             added to, so what it holds when a call is interrupted is what that had done.
-        report: told of the samples a pixel after every pass.
+        progress: told of the samples a pixel after every pass.
     """
     pixels = renderer.height * renderer.width
     sums = SampleSums.start(renderer.height, renderer.width) if sums is None else sums
@@ -122,5 +122,5 @@ def render_reference(renderer: Renderer, index: int, seed: int, spp: int, *,
         part, count = step
         start = sums.samples[part]
         sums.add(part, renderer.sample_sum(index, seed, part, count, antialias, start), count)
-        report(sum(sums.samples), PARTS * end, f"reference of frame {index}")
+        progress(sum(sums.samples), PARTS * end, f"reference of frame {index}")
     return sums.reference()

@@ -52,6 +52,6 @@ def test_an_interrupt_loses_no_frame_that_was_rendered(tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        render_sequence(RenderJob(small_scene(), (0, 1, 2), 12, 12), tmp_path / "s", report=stop)
+        render_sequence(RenderJob(small_scene(), (0, 1, 2), 12, 12), tmp_path / "s", progress=stop)
     sequence = FrameSequence.open(tmp_path / "s")
     assert [sequence.frame_is_whole(i) for i in (0, 1, 2)] == [True, True, False]
