@@ -103,7 +103,7 @@ def test_the_cost_is_told_first_and_an_end_that_came_too_soon(tmp_path, monkeypa
         if what.startswith("reference"):
             shares.append(done / total)
 
-    sequence = render_sequence(job(1e-6), tmp_path / "s", report=report,
+    sequence = render_sequence(job(1e-6), tmp_path / "s", progress=report,
                                tell=lambda sentence: told.append((shares[-1], sentence)))
     (first, cost), (last, end) = told
     assert [sequence.reference_spp(i) for i in FRAMES] == [128] * len(FRAMES)
@@ -146,3 +146,18 @@ def test_parts_of_a_frame_have_noise_of_their_own(undisturbed):
         for b in range(a):
             assert (parts[a] != parts[b]).mean() > 0.5
     assert np.isfinite(parts).all()
+
+
+def test_what_a_reference_has_so_far_is_on_the_disk_while_it_grows(tmp_path, monkeypatch):
+    """A process that is killed gets no chance to save."""
+    monkeypatch.setattr(onespp.render.references, "SECONDS_BETWEEN_SAVES", -1.0)
+    saved = []
+
+    def look(done: float, total: float, what: str, note: str = "", /) -> None:
+        if what.startswith("reference") and (folder := tmp_path / "s/reference").exists():
+            saved.extend(folder.glob("*.npz"))
+
+    render_sequence(RenderJob(small_scene(), (0,), SIZE, SIZE, reference_spp=256), tmp_path / "s",
+                    progress=look)
+    assert len(saved) >= 3
+    assert not list((tmp_path / "s").rglob("*.npz"))

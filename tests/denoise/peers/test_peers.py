@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from onespp.denoise.catalog import METHODS, PEERS, build, parameters
 from onespp.denoise.peers import oidn
+from onespp.denoise.peers.oidn_split import OidnSplit
+from onespp.denoise.peers.temporal_oidn_split import TemporalOidnSplit
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.host import backend
@@ -239,3 +242,45 @@ def test_a_shadow_that_moves_leaves_no_trail_in_light_that_stands_still():
     after, truth = split_frame(moved, seed=1)
     error = np.abs(run("temporal-oidn-split", before, after) - truth)[:, 2:17].mean()
     assert error < 0.12
+
+
+class Network:
+    """In the place of Open Image Denoise: keeps the frames it gets, and returns their colour."""
+
+    def __init__(self) -> None:
+        self.seen: list[Frame] = []
+
+    def init(self, height: int, width: int) -> None:
+        pass
+
+    def __call__(self, frame: Frame, state: None) -> tuple[np.ndarray, None]:
+        self.seen.append(frame)
+        return np.array(frame["color"]), state
+
+
+def test_the_network_sees_visibility_on_white_and_the_rest_on_the_surface():
+    visible = np.random.default_rng(0).random((H, W)).astype(np.float32)
+    frame, _ = split_frame(visible)
+    network = Network()
+    image, _ = OidnSplit(cast(Any, network))(frame, cast(Any, None))
+    shadows, rest = network.seen
+    np.testing.assert_array_equal(shadows["color"], np.repeat(visible[..., None], 3, axis=2))
+    np.testing.assert_array_equal(shadows["albedo"], 1)
+    np.testing.assert_array_equal(rest["albedo"], frame["albedo"])
+    for seen in network.seen:
+        np.testing.assert_array_equal(seen["normal"], frame["normal"])
+        assert "emission" not in seen
+    np.testing.assert_allclose(image, frame["color"], rtol=1e-5, atol=1e-6)
+
+
+def test_the_network_sees_visibility_with_its_history():
+    rng = np.random.default_rng(1)
+    frames = [split_frame(rng.random((H, W)).astype(np.float32))[0] for _ in range(3)]
+    network = Network()
+    method = TemporalOidnSplit(split=OidnSplit(cast(Any, network)))
+    state = method.init(H, W)
+    for frame in frames:
+        _, state = method(frame, state)
+    first, last = network.seen[0]["color"], network.seen[4]["color"]
+    np.testing.assert_allclose(first[..., 0], frames[0]["visibility"], rtol=1e-6)
+    assert last.var() < 0.7 * frames[2]["visibility"].var()
