@@ -8,7 +8,8 @@ it that arrives (`render/tracer/lights.py`); G the part of I that a glossy lobe 
 V is a scalar whose texture, shading and highlights are all in U, which has no noise: a filter of V
 cannot blur them. V is capped at `LARGEST_VISIBILITY`; what is above, what U lacks altogether (a
 mirror's image of a lamp) and the colour that one V for all lights misses are left in L, so that
-nothing is lost. G is the image of something else: the surface's albedo is not in it.
+nothing is lost. G is the image of something else: the surface's albedo is not in it. On a surface
+without a diffuse lobe (its albedo is 1, its roughness below 1) all of that is G, and L is 0.
 
 Where several lights meet, V is noise of which of them the shadow ray went to. Frames of such a
 scene have groups of lights g, and several signals V_g: each is known where the ray went to its
@@ -41,7 +42,7 @@ from onespp.render.frame import Frame
 from .demodulation import Texture, read_texture
 from .repair import repair
 
-USED = ("direct", "indirect", "unshadowed", "visibility", "specular", *GROUPED)
+USED = ("direct", "indirect", "unshadowed", "visibility", "specular", "roughness", *GROUPED)
 LARGEST_VISIBILITY = 2.0
 _LEAST_SHARE = 1e-5  # of U, below which B is a rounding
 
@@ -81,7 +82,7 @@ class Signals:
         kinds: of signals: L, then G and V where they are apart. listed: the signals. That of a
             group's visibility is y, 0 where the ray went to another group.
         unshadowed: what each V is a share of. texture: albedo and emission.
-        chosen: None where all lights are one.
+        chosen: None where all lights are one. roughness: where G is apart and its lobes are known.
     """
 
     kinds: tuple[SignalKind, ...]
@@ -89,6 +90,7 @@ class Signals:
     unshadowed: list[Color]
     texture: Texture
     chosen: Chosen | None = None
+    roughness: Float | None = None
 
     @property
     def groups(self) -> int:
@@ -127,10 +129,12 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
     if "emission" in frame and not texture.emission:
         texture = Texture(texture.albedo, Color(*load("emission")), texture.zero_albedo)
     light = Color(*[d + i for d, i in zip(load("direct"), load("indirect"))])
-    kinds, apart, unshadowed, chosen = [SignalKind.DIFFUSE], [], [], None
+    kinds, apart, unshadowed, chosen, roughness = [SignalKind.DIFFUSE], [], [], None, None
     if gloss and "specular" in frame:
         specular = Color(*load("specular"))
         light = Color(*[c - g for c, g in zip(light, specular)])
+        if "roughness" in frame:
+            (roughness,) = load("roughness")
         kinds.append(SignalKind.GLOSSY)
         apart.append(_of_light(specular))
     if "unshadowed" in frame and "visibility" in frame:
@@ -148,8 +152,14 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
         light = _with(light, -visibility[0], unshadowed[0])
         kinds += [SignalKind.VISIBILITY] * len(visibility)
         apart += [Signal(None, v, None) for v in visibility]
+    if roughness is not None and texture.albedo:
+        white = [a >= 1 for a in texture.albedo]
+        is_bare = (roughness < 1) & white[0] & white[1] & white[2]
+        more = _of_light(Color(*[dr.select(is_bare, c, 0) for c in light]))
+        apart[0] = Signal(*[g + m for g, m in zip(apart[0], more)])
+        light = Color(*[dr.select(is_bare, 0, c) for c in light])
     diffuse = _of_light(Texture(texture.albedo).demodulate(light))
-    return Signals(tuple(kinds), [diffuse, *apart], unshadowed, texture, chosen)
+    return Signals(tuple(kinds), [diffuse, *apart], unshadowed, texture, chosen, roughness)
 
 
 def _tell_apart(visibility: Float, unshadowed: list[Color], light: Color, group: Float, y: Float,
