@@ -13,11 +13,13 @@ without a diffuse lobe (its albedo is 1, its roughness below 1) all of that is G
 
 Where several lights meet, V is noise of which of them the shadow ray went to. Frames of such a
 scene have groups of lights g, and several signals V_g: each is known where the ray went to its
-group. What the BSDF's sample finds, B = U - sum U_g unshadowed, has a V_b, known everywhere. With
-y, omega and P of `lights.py`,
+group. With y, omega and P of `lights.py`,
 
-    colour = E + V_b B + sum V_g U_g + a L + G     V_b = (l(U) V - y l(U_g) / P) / l(B)
-    L = (I - G + D - V_b B - y U_g / P) / a        sum over pixels of y = that of omega V_g.
+    colour = E + sum V_g U_g + a L + G
+    L = (I - G + D - y U_g / P) / a                sum over pixels of y = that of omega V_g.
+
+What the BSDF's sample finds of the lights is in L. (As a share of U - sum U_g it loses 0.6 dB on
+average: midpoints of a sky's strata say little of what a sample of a lobe finds.)
 
 A frame that lacks the split has D in L; one without direct light, its colour.
 """
@@ -44,7 +46,6 @@ from .repair import repair
 
 USED = ("direct", "indirect", "unshadowed", "visibility", "specular", "roughness", *GROUPED)
 LARGEST_VISIBILITY = 2.0
-_LEAST_SHARE = 1e-5  # of U, below which B is a rounding
 
 
 class SignalKind(Enum):
@@ -95,7 +96,7 @@ class Signals:
     @property
     def groups(self) -> int:
         """How many groups of lights there are, 0 where all lights are one."""
-        return len(self.unshadowed) - 1 if self.chosen else 0
+        return len(self.unshadowed) if self.chosen else 0
 
     def color(self, signals: Sequence[Signal]) -> Color:
         """The colour that (filtered) signals make, in the order of `listed`."""
@@ -138,18 +139,19 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
         kinds.append(SignalKind.GLOSSY)
         apart.append(_of_light(specular))
     if "unshadowed" in frame and "visibility" in frame:
-        unshadowed = [Color(*load("unshadowed"))]
-        visibility = load("visibility")
         if "group" in frame and "group_sample" in frame:
-            unshadowed += [Color(*load(name)) for name in UNSHADOWED if name in frame]
+            unshadowed = [Color(*load(name)) for name in UNSHADOWED if name in frame]
             group, (y, weight, chance) = *load("group"), load("group_sample")
-            visibility, unshadowed[0], light, y = _tell_apart(visibility[0], unshadowed, light,
-                                                              group, y, chance)
+            y = _capped(y)
             chosen = Chosen(group, dr.select(group >= 0, weight, 0))
-            visibility += [dr.select(group == g, y, 0) for g in range(len(unshadowed) - 1)]
-        visibility[0] = dr.select(visibility[0] < LARGEST_VISIBILITY, visibility[0],
-                                  LARGEST_VISIBILITY)
-        light = _with(light, -visibility[0], unshadowed[0])
+            visibility = [dr.select(group == g, y, 0) for g in range(len(unshadowed))]
+            scale = dr.select(chance > 0, 1 / dr.select(chance > 0, chance, 1), 0)
+            told = [v * scale for v in visibility]
+        else:
+            unshadowed = [Color(*load("unshadowed"))]
+            told = visibility = [_capped(v) for v in load("visibility")]
+        for v, u in zip(told, unshadowed, strict=True):
+            light = _with(light, -v, u)
         kinds += [SignalKind.VISIBILITY] * len(visibility)
         apart += [Signal(None, v, None) for v in visibility]
     if roughness is not None and texture.albedo:
@@ -162,26 +164,9 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
     return Signals(tuple(kinds), [diffuse, *apart], unshadowed, texture, chosen, roughness)
 
 
-def _tell_apart(visibility: Float, unshadowed: list[Color], light: Color, group: Float, y: Float,
-                chance: Float) -> tuple[list[Float], Color, Color, Float]:
-    """V_b, B, the light without what y tells of, and y, capped.
-
-    Args:
-        unshadowed: U, and U_g of each group. light: all but emission and what gloss reflects.
-    """
-    rest, here = unshadowed[0], Color(*[0 * c for c in light])
-    for g, u in enumerate(unshadowed[1:]):
-        here = Color(*[dr.select(group == g, c, h) for c, h in zip(u, here)])
-        rest = Color(*[c - r for c, r in zip(rest, u)])
-    rest = Color(*[dr.maximum(c, 0) for c in rest])
-    scale = dr.select(chance > 0, 1 / dr.select(chance > 0, chance, 1), 0)
-    found = visibility * luminance(unshadowed[0]) - y * scale * luminance(here)
-    possible = luminance(rest)
-    is_some = possible > _LEAST_SHARE * luminance(unshadowed[0])
-    v = dr.select(is_some, dr.maximum(found, 0) / dr.select(is_some, possible, 1), 1)
-    y = dr.select(y < LARGEST_VISIBILITY, y, LARGEST_VISIBILITY)
-    rest = Color(*[dr.select(is_some, c, 0) for c in rest])
-    return [v], rest, _with(light, -y * scale, here), y
+def _capped(visibility: Float) -> Float:
+    """At most `LARGEST_VISIBILITY`, which what is not a number counts as."""
+    return dr.select(visibility < LARGEST_VISIBILITY, visibility, LARGEST_VISIBILITY)
 
 
 def _with(color: Color, visibility: Float, unshadowed: Color) -> Color:

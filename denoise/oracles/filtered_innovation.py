@@ -26,39 +26,29 @@ def texture_of(frame: Frame) -> np.ndarray:
 
 
 def unshadowed_of(frame: Frame) -> dict[str, np.ndarray]:
-    """U of each visibility: of V or, where lights are in groups, of what the BSDF's sample finds,
-    also V, and of each group, by its number."""
-    whole = frame["unshadowed"].astype(float)
+    """U of each visibility: of V or, where lights are in groups, of each group, by its number."""
     groups = {name[10:]: frame[name].astype(float) for name in sorted(frame.images)
               if name.startswith("unshadowed") and name != "unshadowed"}
-    rest = np.maximum(whole - sum(groups.values()), 0) if groups else whole
-    some = lum(rest) > (1e-5 * lum(whole) if groups else -1)
-    return {"V": np.where(some[..., None], rest, 0), **groups}
+    return groups or {"V": frame["unshadowed"].astype(float)}
 
 
 def signals_of(frame: Frame) -> dict[str, np.ndarray]:
     """L, G and V, (h, w, c), then y of each group."""
     light = frame["direct"].astype(float) + frame["indirect"] - frame["specular"]
     unshadowed = unshadowed_of(frame)
-    v, told = frame["visibility"].astype(float), {}
+    told, chance = {"V": np.minimum(frame["visibility"].astype(float), 2)[..., None]}, 1.0
     if "group" in frame:
-        y, _, chance = np.moveaxis(frame["group_sample"].astype(float), -1, 0)
+        y, _, chance = np.moveaxis(frame["group_sample"].astype(float)[..., None], -2, 0)
+        told = {g: np.where((frame["group"] == int(g))[..., None], np.minimum(y, 2), 0)
+                for g in sorted(unshadowed)}
         chance = np.where(chance > 0, chance, np.inf)
-        whole, rest = lum(frame["unshadowed"].astype(float)), lum(unshadowed["V"])
-        found = v * whole
-        for g in unshadowed.keys() - {"V"}:
-            here = frame["group"] == int(g)
-            told[g] = np.where(here, np.minimum(y, 2), 0)[..., None]
-            found = found - np.where(here, y / chance * lum(unshadowed[g]), 0)
-            light = light - told[g] / chance[..., None] * unshadowed[g]
-        v = np.where(rest > 0, np.maximum(found, 0) / np.where(rest > 0, rest, 1), 1)
-    v = np.minimum(v, 2)[..., None]
-    light = light - v * unshadowed["V"]
+    for name, v in told.items():
+        light = light - v / chance * unshadowed[name]
     bare = (texture_of(frame) >= 1).all(-1)  # all that is left is G
     bare &= roughness_of(frame) < 1 if "roughness" in frame else False
     mirrored = np.where(bare[..., None], light, 0)
     return {"L": (light - mirrored) / texture_of(frame),
-            "G": frame["specular"] + mirrored, "V": v, **dict(sorted(told.items()))}
+            "G": frame["specular"] + mirrored, **told}
 
 
 def roughness_of(frame: Frame) -> np.ndarray:
