@@ -381,10 +381,11 @@ def run(frames: list[Frame], m) -> np.ndarray:
                 a = a if name == "L" else np.maximum(a, m.change_alpha * certain)
             if sparse:
                 norm = norm_of(frame, here, found, smoothing, m, narrow)[..., None]
-                mean = np.clip(h + norm * wide, 0, 1)[..., 0]
+                change = np.clip(h + norm * wide, -0.5, 2) - h
+                mean = np.clip(h + change, 0, 1)[..., 0]
                 noise = np.where(found, np.maximum(mean * (1 - mean), 0.01), noise)
-                rest = e - here[..., None] * norm * wide
-                history = h + follow[..., None] * norm * wide + np.minimum(a, 1)[..., None] * rest
+                rest = e - here[..., None] * change
+                history = h + follow[..., None] * change + np.minimum(a, 1)[..., None] * rest
                 history = np.where(found[..., None], history, np.where(omega[..., None] > 0,
                                                                        lone, 0.5))
                 samples = samples + omega

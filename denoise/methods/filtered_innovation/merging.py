@@ -24,6 +24,7 @@ _FILLED = 0.5                  # samples that what was filtered counts for
 _UNKNOWN = 0.5                 # visibility that nothing is known of
 _LEAST_NOISE = 0.01            # variance of a sample of visibility
 _MOST_SAMPLES = 64.0
+LEAST_MEAN = -0.5              # of h + S[e] / S[omega]; lone rays with a small omega say anything
 _LEAST_OMEGA = 0.1             # that a lone sample is divided by
 _OTHER_IMAGE = 0.5             # lobes by which a mirror direction may turn
 _MIN_ENERGY = 1e-20            # square of a luminance that is taken for 0
@@ -88,7 +89,9 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
                 noise = dr.select(is_other, spatial[s], noise)
         else:
             g = s - len(dense)
-            old, change = innovations.sparse[g], _norm(smoothed.weights[g]) * wide.luminance
+            old = innovations.sparse[g]
+            low = dr.fma(_norm(smoothed.weights[g]), wide.luminance, old.history)
+            change = dr.clip(low, LEAST_MEAN, LARGEST_VISIBILITY) - old.history
             a = dr.minimum(dr.maximum(1 / (old.samples + old.weight + _FILLED), alpha), 1)
             v = dr.fma(gain, change, old.history)
             v = dr.fma(a, dr.fma(-old.weight, change, e.luminance), v)
