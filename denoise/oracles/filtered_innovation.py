@@ -400,7 +400,7 @@ def run(frames: list[Frame], m) -> np.ndarray:
             sigmas = sigma + 0 * n
             if name == "G" and "roughness" in frame:
                 least = min(m.mirror_sigma / sigma, 1)
-                sigmas = sigma * np.clip(roughness_of(frame) / 0.3, least, 1)
+                sigmas = sigma * np.clip(roughness_of(frame) / 0.1, least, 1)
             out[name] = guided(frame, history, s2, levels, sigmas, fade, narrow, m,
                                np.clip(samples, 1e-5, 1) if sparse else None)
             if sparse:

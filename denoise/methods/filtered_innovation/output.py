@@ -21,7 +21,7 @@ from .layout import NoisySignal, SignalLayout
 from .smoothing import footprint
 
 FEWEST_SAMPLES = 1e-5          # that a sparse signal's pixel counts for where it has none
-WIDE_LOBE = 0.3                # roughness from which glossy light is as smooth as diffuse light
+WIDE_LOBE = 0.1                # roughness: such a lobe blurs an image as far as the filter does
 _NEVER = -1e3                  # log2 of a weight that is 0
 
 
