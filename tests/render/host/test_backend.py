@@ -87,8 +87,8 @@ def spoiled(tmp_path, module: str, code: str) -> str:
     ("OpenEXR", "import ctypes; ctypes.string_at(8)", "BAD   OpenEXR: crashed (SIGSEGV)"),
     ("matplotlib", "raise ImportError('no such symbol')",
      "BAD   Matplotlib: ImportError: no such symbol"),
-    ("imageio_ffmpeg", "def get_ffmpeg_exe(): raise RuntimeError('none for this platform')",
-     "note  ffmpeg: RuntimeError: none for this platform; videos are left out")])
+    ("av", "def open(*_, **__): raise RuntimeError('none for this platform')",
+     "note  PyAV: RuntimeError: none for this platform; movies are left out")])
 @pytest.mark.skipif(sys.platform == "win32", reason="no signals to die of")
 def test_doctor_survives_a_library_that_crashes_and_names_it(tmp_path, module, code, words):
     done = onespp("doctor", PYTHONPATH=spoiled(tmp_path, module, code))
