@@ -13,6 +13,7 @@ from onespp.denoise.cli.score import score
 from onespp.denoise.cli.time import time_
 from onespp.denoise.cli.truth import truth
 from onespp.denoise.cli.tune import tune
+from onespp.denoise.cli.view import view
 from onespp.render.cli.render import export, import_, render
 from onespp.render.cli.terminal import run as run_command
 
@@ -29,8 +30,8 @@ def app() -> None:
     """Render animations at one sample per pixel, denoise them, score the result."""
 
 
-for command in (scenes, render, denoise, time_, score, run, report, compare, bench, tune, ablate,
-                lead, truth, hard, import_, export, doctor):
+for command in (scenes, render, denoise, time_, score, run, report, view, compare, bench, tune,
+                ablate, lead, truth, hard, import_, export, doctor):
     app.add_command(command)
 
 
