@@ -17,6 +17,7 @@ from onespp.denoise.cli.view import view
 from onespp.render.cli.render import export, import_, render
 from onespp.render.cli.terminal import run as run_command
 
+from .completion import completion
 from .doctor import doctor
 from .hard import hard
 from .lead import lead
@@ -31,7 +32,8 @@ def app() -> None:
 
 
 for command in (scenes, render, denoise, time_, score, run, report, view, compare, bench, tune,
-                ablate, lead, truth, hard, import_, export, doctor):
+                ablate, lead, truth, hard, import_, export, doctor,
+                completion):
     app.add_command(command)
 
 
