@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -68,20 +67,23 @@ def _offer(words: dict[str, Any], kind: str | list[str], context: click.Context,
     listed = kind in ("channel", "method")
     before, comma, last = typed.rpartition(",") if listed else ("", "", typed)
     names = kind if isinstance(kind, list) else _WORDS[kind](words, context) if kind else ()
-    found = [CompletionItem(before + comma + n) for n in names
-             if n.startswith(last) and n not in before.split(",")]
-    return found or ([CompletionItem(typed, type="file")] if kind in ("method", "scene") else [])
+    found = [n for n in names if n.startswith(last) and n not in before.split(",")]
+    if kind in ("method", "scene") and not found:
+        found = [n for n in _installed(f"onespp.{kind}s") if n.startswith(last)]
+        if not found:
+            return [CompletionItem(typed, type="file")]
+    return [CompletionItem(before + comma + name) for name in found]
 
 
-def _methods(words: dict[str, Any], _: click.Context) -> Iterator[str]:
-    yield from words["methods"]
-    yield from ("all", "oidn")
-    yield from (point.name for point in entry_points(group="onespp.methods"))
+def _installed(group: str) -> list[str]:
+    """Names that other packages add; asked last, for it takes as long as all the rest."""
+    from importlib.metadata import entry_points
+
+    return [point.name for point in entry_points(group=group)]
 
 
-def _scenes(words: dict[str, Any], _: click.Context) -> Iterator[str]:
-    yield from words["scenes"]
-    yield from (point.name for point in entry_points(group="onespp.scenes"))
+def _methods(words: dict[str, Any], _: click.Context) -> list[str]:
+    return [*words["methods"], "all", "oidn"]
 
 
 def _parameters(words: dict[str, Any], context: click.Context) -> list[str]:
@@ -101,7 +103,7 @@ def _of(key: str) -> Callable[[dict[str, Any], click.Context], list[str]]:
 
 
 _WORDS: dict[str, Callable[[dict[str, Any], click.Context], Any]] = {
-    "method": _methods, "scene": _scenes, "parameter": _parameters, "setting": _settings,
+    "method": _methods, "scene": _of("scenes"), "parameter": _parameters, "setting": _settings,
     "hard": _of("hard"), "channel": _of("channels"), "device": _of("devices")}
 
 

@@ -25,7 +25,14 @@ from .run import run
 from .scenes import scenes
 
 
-@click.group()
+EXIT_CODES = {
+    "": "Exit codes: 0 done, 2 bad input or a machine that lacks something, 130 interrupted.",
+    "compare": "Exit codes: 0 nothing got worse, 1 something did, 2 bad input, 130 interrupted.",
+    "doctor": "Exit codes: 0 all that is needed runs, 2 something does not, 130 interrupted.",
+}
+
+
+@click.group(epilog=EXIT_CODES[""])
 @click.version_option(package_name="onespp")
 def app() -> None:
     """Render animations at one sample per pixel, denoise them, score the result."""
@@ -34,7 +41,10 @@ def app() -> None:
 for command in (scenes, render, denoise, time_, score, run, report, view, compare, bench, tune,
                 ablate, lead, truth, hard, import_, export, doctor,
                 completion):
+    command.epilog = EXIT_CODES.get(command.name or "", EXIT_CODES[""])
     app.add_command(command)
+for command in bench.commands.values():
+    command.epilog = EXIT_CODES[""]
 
 
 def main() -> None:
