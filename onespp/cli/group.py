@@ -24,7 +24,6 @@ from .lead import lead
 from .run import run
 from .scenes import scenes
 
-
 EXIT_CODES = {
     "": "Exit codes: 0 done, 2 bad input or a machine that lacks something, 130 interrupted.",
     "compare": "Exit codes: 0 nothing got worse, 1 something did, 2 bad input, 130 interrupted.",

@@ -60,8 +60,8 @@ def test_what_runs_methods_gives_its_figures_too(tmp_path, call):
     assert times["methods"]["svgf"]["ms"] > 0
     parts = json.loads(call("ablate", folder, "--method", "bilateral", "--json", "-")[1])
     assert parts["sequences"]["box"][0]["means"]["psnr_srgb"] > 5
-    best = json.loads(call("tune", folder, "--method", "bilateral", "--parameter", "isolate_background",
-                           "--json", "-")[1])
+    best = json.loads(call("tune", folder, "--method", "bilateral", "--parameter",
+                           "isolate_background", "--json", "-")[1])
     assert best["psnr_srgb"] >= best["psnr_srgb_at_start"]
 
 
