@@ -78,7 +78,7 @@ def _kernel(folder: Path) -> str:
     device = backend.choose()
     import drjit as dr
 
-    module = {"llvm": dr.llvm, "cuda": dr.cuda}[device]
+    module = getattr(dr, device)
     total = dr.sum(module.Float(dr.arange(module.UInt32, 1000)))[0]
     _expect(total == 499500, f"computed a wrong sum on {device}: {total}")
     count = dr.thread_count()
