@@ -335,3 +335,11 @@ def test_points_of_times_not_measured_in_turns_are_hollow(tmp_path, drawn):
 
     assert hollow(False, False) == hollow(True, True) == [False, False]
     assert hollow(True, False) == [False, True]
+
+
+def test_the_command_tells_how_to_get_a_movie_and_goes_on(tmp_path, monkeypatch, call):
+    monkeypatch.setitem(sys.modules, "av", None)
+    code, out, _ = call("score", make_sequence(tmp_path / "made").folder)
+    assert code == 0
+    assert ("There is no movie: PyAV is not installed: run `pip install 'onespp[movie]'`."
+            in " ".join(out.split()))
