@@ -123,6 +123,19 @@ def test_each_shell_gets_a_script_that_it_can_read(shell, call, tmp_path):
         assert subprocess.run([shell, "-n", str(tmp_path / "script")]).returncode == 0
 
 
+@pytest.mark.skipif(not shutil.which("bash"), reason="there is no bash")
+def test_bash_itself_completes_with_it(call, tmp_path):
+    (tmp_path / "script").write_text(call("completion", "bash")[1])
+    (tmp_path / "onespp").write_text(f"#!/bin/sh\nexec {sys.executable} -m onespp \"$@\"\n")
+    (tmp_path / "onespp").chmod(0o755)
+    code = ('. ./script; COMP_WORDS=(onespp render room --sampler blue); COMP_CWORD=4; '
+            '_onespp_completion onespp blue --sampler; echo "${COMPREPLY[@]}"')
+    path = f"{tmp_path}{os.pathsep}{os.environ['PATH']}"
+    done = subprocess.run(["bash", "-c", code], cwd=tmp_path, capture_output=True, text=True,
+                          env={**os.environ, "PATH": path})
+    assert done.stdout == "bluenoise\n", done.stderr
+
+
 def test_another_shell_is_refused_in_a_sentence(call):
     code, _, words = call("completion", "tcsh")
     assert code == 2
