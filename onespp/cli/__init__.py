@@ -1,6 +1,10 @@
 """The command line."""
 
 import os
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .group import app
 
 __all__ = ["app", "main"]
 
