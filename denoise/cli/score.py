@@ -21,31 +21,38 @@ from .options import json_option, show_or_print
 @json_option
 @click.option("--pictures/--no-pictures", default=True, show_default=True,
               help="Draw contact sheets, plot and movie.")
+@click.option("--movie/--no-movie", default=None,
+              help="Insist on the movie, or leave it out; default: make it where PyAV is "
+              "(`pip install 'onespp[movie]'`).")
 @click.option("--by-cause", is_flag=True,
               help="Also show the error by cause (disoccluded, moving, ...) and by history.")
 @click.option("--seeds", multiple=True, type=click.Path(path_type=Path), metavar="DIR",
               help="A render of the same with another --seed, denoised alike: splits the error "
               "into bias and variance; may be given several times.")
 def score(folder: Path, methods: tuple[str, ...], json_to: str | None, pictures: bool,
-          by_cause: bool, seeds: tuple[Path, ...]) -> None:
+          movie: bool | None, by_cause: bool, seeds: tuple[Path, ...]) -> None:
     """Score what the sequence in FOLDER holds; write scores.json, scores.csv and pictures."""
-    score_in(folder, methods, json_to, pictures, by_cause, seeds)
+    score_in(folder, methods, json_to, pictures, by_cause, seeds, movie)
 
 
 def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = None,
-             pictures: bool = True, by_cause: bool = False, seeds: tuple[Path, ...] = ()) -> None:
+             pictures: bool = True, by_cause: bool = False, seeds: tuple[Path, ...] = (),
+             movie: bool | None = None) -> None:
     """Do what the options of `score` ask."""
     from onespp.denoise.report.contact_sheets import draw_pictures
+    from onespp.denoise.report.movie import require_av
     from onespp.denoise.report.terminal import print_classes, print_scores, print_splits
     from onespp.denoise.score.sequence import score as score_sequence
 
+    if movie:
+        require_av()
     sequence = FrameSequence.open(folder)
     others = [FrameSequence.open(other) for other in seeds]
     with writing(folder, "score"), progress() as report:
         scores = score_sequence(sequence, list(methods) or None, report, others, command_line())
         if pictures:  # after the scores, which are on disk whatever happens here
             trouble = draw_pictures(sequence, scores, [m for m in methods if m != INPUT] or None,
-                                    report)
+                                    report, movie=movie is not False)
             scores = scores.model_copy(update={"notes": [*scores.notes, *trouble]})
 
     def show() -> None:

@@ -43,7 +43,7 @@ def _grid(title: str | None, headings: Sequence[str]) -> Table:
 
 def caption(result: Bench) -> str:
     """What the numbers stand on."""
-    yardstick = ("Open Image Denoise is not installed (pip install pyoidn)"
+    yardstick = ("Open Image Denoise is not installed (pip install mitsuba-oidn)"
                  if result.oidn_fast_ms is None else f"OIDN fast {result.oidn_fast_ms:.0f} ms")
     return (f"Medians of {result.repeats}, taking turns. ms: arrays to arrays; call: images to "
             f"images; first: compilation included. {yardstick}. Bandwidth and arithmetic: share of "

@@ -26,7 +26,7 @@ def print_comparison(found: Comparison, show_all: bool = False,
         console.print(f"{same} of {len(found.changes)} measures are the same, to within "
                       f"{SIGMAS:g} standard errors.", style="dim", highlight=False)
     for note in found.notes:
-        console.print(note, style="yellow", highlight=False)
+        console.print(note, style="yellow", highlight=False, markup=False)
     failures = [c for c in found.changes if c.failed]
     if failures:
         found_in = {c.method: ", ".join(ROWS[d.measure].label for d in failures

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from onespp.render.cli.figures import json_option, show_or_print
 from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import progress
 from onespp.render.progress import Progress
@@ -20,10 +21,11 @@ REFERENCE_SPP = 256
               show_default=True, help="Folder of the sequences.")
 @click.option("--reference-spp", type=int, default=REFERENCE_SPP, show_default=True, metavar="N",
               help="Samples a pixel of the ground truth.")
+@json_option
 @device_option
 @threads_option
-def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
-         threads: int | None) -> None:
+def hard(names: tuple[str, ...], out: Path, reference_spp: int, json_to: str | None,
+         device: str, threads: int | None) -> None:
     """Try every method on hard scenes (all, or those named), and print a table in Markdown.
 
     Renders what is missing. For each scene and method: error, what its history gains, how soon it
@@ -42,7 +44,7 @@ def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
         for number, name in enumerate(names or HARD):
             rows += _judge_hard(name, out, reference_spp,
                                 _within(report, number, len(names or HARD), name))
-    click.echo(markdown(rows))
+    show_or_print(rows, json_to, lambda: click.echo(markdown(rows)))
 
 
 def _judge_hard(name: str, out: Path, reference_spp: int, report: Progress) -> list:
