@@ -37,6 +37,7 @@ ROOMS = (
     "onespp.scenes.catalog", "onespp.scenes.generated", "onespp.scenes.hard", "onespp.scenes.room",
     "onespp.scenes",
     "onespp",
+    "onespp.user_code",
 )
 MOST_FILES = 12
 ONLY_IN = {  # package -> rooms that may import it
