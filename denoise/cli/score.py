@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from onespp.denoise.own_method import result_name
 from onespp.denoise.score.scorecard import INPUT
 from onespp.render.cli.terminal import command_line, progress
 from onespp.render.files.lock import writing
@@ -39,7 +40,7 @@ def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = 
     from onespp.denoise.report.terminal import print_classes, print_scores, print_splits
     from onespp.denoise.score.sequence import score as score_sequence
 
-    sequence = FrameSequence.open(folder)
+    sequence, methods = FrameSequence.open(folder), tuple(map(result_name, methods))
     others = [FrameSequence.open(other) for other in seeds]
     with writing(folder, "score"), progress() as report:
         scores = score_sequence(sequence, list(methods) or None, report, others, command_line())

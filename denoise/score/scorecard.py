@@ -15,6 +15,7 @@ from typing import Any
 from pydantic import ConfigDict, Field, FiniteFloat, field_validator, model_serializer
 
 from onespp.denoise.metrics.table import ESTIMATED, HEADLINE, MEASURES
+from onespp.denoise.own_method import result_name
 from onespp.render.files.json_file import JsonFile, format_json, read_json
 
 INPUT = "input"
@@ -190,7 +191,7 @@ class Scores(JsonFile):
     def label(self, name: str) -> str:
         """A method's name for a table, with what ran where that is something else."""
         ran = self.methods[name].method
-        return f"{name} ({ran})" if ran not in ("", name) else name
+        return f"{name} ({ran})" if ran and result_name(ran) != name else name
 
     def ordered(self) -> list[str]:
         """Names of the methods: input, then from fast to slow, then those without a time."""
