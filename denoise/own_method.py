@@ -231,7 +231,10 @@ def wrong_image(image: Any, frame: Frame) -> str | None:
 
 def brief(value: Any) -> str:
     """A value for a message."""
-    return "None" if value is None else f"a {type(value).__name__}"
+    if value is None:
+        return "None"
+    name = "array" if isinstance(value, np.ndarray) else type(value).__name__
+    return f"a{'n' if name[0] in 'aeiouAEIOU' else ''} {name}"
 
 
 def _locked(array: np.ndarray) -> np.ndarray:

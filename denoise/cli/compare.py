@@ -26,12 +26,11 @@ def compare(a: Path, b: Path, methods: tuple[str, ...], thresholds: tuple[str, .
 
     Change by change, with its standard error over the frames that both have.
     """
-    from onespp.denoise.own_method import result_name
     from onespp.denoise.report.comparison import print_comparison
     from onespp.denoise.score.compare import comparison, parse_thresholds
     from onespp.denoise.score.scorecard import read_scores
 
-    found = comparison(read_scores(a), read_scores(b), [result_name(m) for m in methods] or None,
+    found = comparison(read_scores(a), read_scores(b), list(methods) or None,
                        parse_thresholds(thresholds))
     show_or_print(found.json_text(), json_to, lambda: print_comparison(found, show_all))
     if found.failed:

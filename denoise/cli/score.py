@@ -40,13 +40,13 @@ def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = 
     from onespp.denoise.report.terminal import print_classes, print_scores, print_splits
     from onespp.denoise.score.sequence import score as score_sequence
 
-    sequence, methods = FrameSequence.open(folder), tuple(map(result_name, methods))
+    sequence = FrameSequence.open(folder)
     others = [FrameSequence.open(other) for other in seeds]
     with writing(folder, "score"), progress() as report:
         scores = score_sequence(sequence, list(methods) or None, report, others, command_line())
         if pictures:  # after the scores, which are on disk whatever happens here
-            trouble = draw_pictures(sequence, scores, [m for m in methods if m != INPUT] or None,
-                                    report)
+            drawn = [result_name(m) for m in methods if m != INPUT]
+            trouble = draw_pictures(sequence, scores, drawn or None, report)
             scores = scores.model_copy(update={"notes": [*scores.notes, *trouble]})
 
     def show() -> None:

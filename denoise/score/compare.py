@@ -31,6 +31,7 @@ from onespp.denoise.methods.parameters import present_parameters
 from onespp.denoise.metrics.means import identical
 from onespp.denoise.metrics.metric import Metric
 from onespp.denoise.metrics.table import MEASURES
+from onespp.denoise.own_method import result_name
 from onespp.render.errors import InputError
 from onespp.render.files.json_file import JsonFile, format_json
 
@@ -122,6 +123,7 @@ def comparison(a: Scores, b: Scores, methods: list[str] | None = None,
             raise InputError(f"the scores are not of one sequence: {key.replace('_', ' ')} is "
                              f"{old} in A and {new} in B")
     both = [name for name in a.ordered() if name in b.methods]
+    methods = None if methods is None else [result_name(name) for name in methods]
     for name in methods or ():
         if name not in both:
             raise InputError(f"the method '{name}' is not in both scores, which share "

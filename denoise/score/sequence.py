@@ -22,6 +22,7 @@ from onespp.denoise.metrics.means import identical, mean_decibels, sequence_numb
 from onespp.denoise.metrics.noise_floor import reference_floor, seen_floors
 from onespp.denoise.metrics.table import HEADLINE, MEASURES, METRICS, spread
 from onespp.denoise.metrics.tonemap import TONE_MAP
+from onespp.denoise.own_method import result_name
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
 from onespp.render.files.frame_ranges import format_frames
@@ -134,11 +135,11 @@ def _methods(sequence: FrameSequence, wanted: list[str] | None) -> list[str]:
     if wanted is None:
         return there
     for name in wanted:
-        if name not in there and name != INPUT:
+        if result_name(name) not in there and name != INPUT:
             raise InputError(f"{sequence.folder} has no results of the method '{name}' "
                              f"(it has {', '.join(there) or 'none'}): run "
                              f"`onespp denoise {sequence.folder} --method {name}` first")
-    return [name for name in dict.fromkeys(wanted) if name != INPUT]
+    return [name for name in dict.fromkeys(map(result_name, wanted)) if name != INPUT]
 
 
 def _known(sequence: FrameSequence, number: int, ground: FrameTruth, seen: bool) -> _Known:
