@@ -32,7 +32,7 @@ from onespp.denoise.methods.parameters import renamed_parameters, with_present_n
 from onespp.denoise.methods.separable import BilateralSeparable
 from onespp.denoise.methods.svgf import Svgf
 from onespp.denoise.methods.temporal import Temporal
-from onespp.denoise.own_method import OwnMethod, from_file, installed, is_file, offers
+from onespp.denoise.own_method import OwnMethod, from_file, installed, offers
 from onespp.denoise.peers.oidn import Oidn
 from onespp.denoise.peers.oidn_split import OidnSplit
 from onespp.denoise.peers.optix import Optix
@@ -42,6 +42,7 @@ from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.host import backend
 from onespp.render.host.versions import versions
+from onespp.user_code import is_file
 
 from .peers import oidn
 

@@ -19,7 +19,6 @@ import inspect
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -29,23 +28,10 @@ from onespp import entry_points
 from onespp.render.channels import CHANNELS, OFFERED
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
-from onespp.user_code import UserCode, UserFile
+from onespp.user_code import UserCode, UserFile, a_kind, file_and_name, is_file
 
 Value = bool | int | float | str
-_FILE = re.compile(r"(?P<file>.+\.py)(?::(?P<name>.*))?", re.DOTALL)
 _KINDS: tuple[type, ...] = (bool, int, float, str)
-
-
-def is_file(name: str) -> bool:
-    """Whether a method's or a metric's name is that of a file, as f.py or f.py:Name."""
-    return _FILE.fullmatch(name) is not None
-
-
-def parts(name: str) -> tuple[Path, str | None]:
-    """File and name of `f.py:Name`; the name is None where there is none."""
-    match = _FILE.fullmatch(name)
-    assert match
-    return Path(match["file"]), match["name"]
 
 
 def result_name(name: str) -> str:
@@ -55,7 +41,7 @@ def result_name(name: str) -> str:
     """
     if not is_file(name):
         return name
-    file, inner = parts(name)
+    file, inner = file_and_name(name)
     plain = "-".join([file.stem, *([inner] if inner else [])])
     return re.sub(r"[^A-Za-z0-9._+-]", "_", plain).lstrip("._+-") or "own"
 
@@ -103,7 +89,7 @@ class OwnMethod:
         with self.code.running():
             returned = self.method(read_only(frame), state)
         if not isinstance(returned, tuple) or len(returned) != 2:
-            raise self._fault(f"returned {brief(returned)} for frame {frame.index}: "
+            raise self._fault(f"returned {a_kind(returned)} for frame {frame.index}: "
                               "return image, state")
         image, after = returned
         if wrong := wrong_image(image, frame):
@@ -131,7 +117,7 @@ def from_file(name: str) -> OwnMethod:
     Raises:
         InputError: there is no such file, it raises, or it has no such method, or several.
     """
-    path, inner = parts(name)
+    path, inner = file_and_name(name)
     file = UserFile(path, "method file", InputError)
     found = file.run(lambda module: _chosen(module, inner, path.name))
     return own(found, path.name if inner is None else f"{path.name}:{inner}", file)
@@ -209,7 +195,7 @@ def wrong_image(image: Any, frame: Frame) -> str | None:
     """What is wrong with what a method returned as the image of a frame; None: nothing."""
     what, expected = f"for frame {frame.index}", (frame.height, frame.width, 3)
     if not isinstance(image, np.ndarray):
-        return (f"returned {brief(image)} {what}: use a NumPy array"
+        return (f"returned {a_kind(image)} {what}: use a NumPy array"
                 + (", as image.detach().cpu().numpy()" if hasattr(image, "detach") else
                    ", as np.asarray(image)" if hasattr(image, "__array__") else ""))
     if image.shape != expected:
@@ -227,14 +213,6 @@ def wrong_image(image: Any, frame: Frame) -> str | None:
     return (f"returned {int(bad.sum())} pixels that are not finite {what}, the first in row {row}, "
             f"column {column}" + (": the frame's colour is not finite there, replace it first"
                                   if given[row, column] else ""))
-
-
-def brief(value: Any) -> str:
-    """A value for a message."""
-    if value is None:
-        return "None"
-    name = "array" if isinstance(value, np.ndarray) else type(value).__name__
-    return f"a{'n' if name[0] in 'aeiouAEIOU' else ''} {name}"
 
 
 def _locked(array: np.ndarray) -> np.ndarray:

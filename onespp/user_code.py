@@ -17,6 +17,7 @@ import hashlib
 import importlib
 import inspect
 import os
+import re
 import reprlib
 import sys
 import threading
@@ -29,6 +30,7 @@ from typing import Any
 
 _ONE_AT_A_TIME = threading.RLock()  # the search path and standard output are the process's
 _LONGEST = 500  # letters of an error; some libraries write pages
+_FILE = re.compile(r"(?P<file>.+\.py)(?::(?P<name>.*))?", re.DOTALL)
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 200
 
@@ -41,6 +43,26 @@ def said(error: BaseException) -> str:
         return type(error).__name__
     text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def is_file(name: str) -> bool:
+    """Whether the name of a method or a metric is that of a file, as f.py or f.py:Name."""
+    return _FILE.fullmatch(name) is not None
+
+
+def file_and_name(text: str) -> tuple[Path, str | None]:
+    """File and name of `f.py:Name`; the name is None where there is none."""
+    match = _FILE.fullmatch(text)
+    assert match
+    return Path(match["file"]), match["name"]
+
+
+def a_kind(value: Any) -> str:
+    """What a value is, for a message: "an array"."""
+    if value is None:
+        return "None"
+    name = "array" if type(value).__name__ == "ndarray" else type(value).__name__
+    return f"a{'n' if name[0] in 'aeiouAEIOU' else ''} {name}"
 
 
 class UserCode:
