@@ -277,7 +277,8 @@ def _wrong_method(method: Any) -> tuple[str, Any] | None:
     """What keeps an object from being a method, and which function of it; None: nothing."""
     called = _called(method)
     if not callable(method):
-        return (f"{called} cannot be called: add __call__(self, frame, state)",
+        return (f"{called.removesuffix('.__call__')} cannot be called: add __call__(self, frame, "
+                "state)",
                 type(method).__init__)
     if not _takes(method, None, None):
         function = method if inspect.isfunction(method) else type(method).__call__

@@ -21,6 +21,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from onespp import entry_points
 from onespp.user_code import UserFile
 
 from .description import Scene, SceneError, Shape
@@ -35,6 +36,20 @@ def load_file(path: Path) -> Scene:
     file = UserFile(path, "scene file", SceneError)
     with _old_names(file.path):
         return file.run(lambda module: _found_from(_checked(_made(module)), file.path.parent))
+
+
+def installed(name: str) -> Scene | None:
+    """The scene that an installed package offers under a name; None if none does.
+
+    Raises:
+        SceneError: it cannot be imported, raises, or is no scene; or several packages have it.
+    """
+    offer = entry_points.offered(name, entry_points.SCENES, SceneError)
+    if offer is None:
+        return None
+    found, code = offer.load("scene", SceneError)
+    with code.running():
+        return _checked(found() if callable(found) else found)
 
 
 def _made(module: ModuleType) -> Any:
