@@ -255,12 +255,16 @@ class Scores(JsonFile):
         return text.getvalue()
 
 
+def taken_names() -> set[str]:
+    """Names that mean something else in files of scores."""
+    return {*MEASURES, *FrameScore.model_fields, *MethodScore.model_fields, "method", "frame",
+            "reference_floor_db", *(f"{m}_error" for m in ESTIMATED)}
+
+
 def check_own(metrics: Iterable[Metric]) -> None:
-    """InputError where a metric has a name that means something else in files of scores."""
-    taken = {*MEASURES, *FrameScore.model_fields, *MethodScore.model_fields, "method", "frame",
-             "reference_floor_db", *(f"{m}_error" for m in ESTIMATED)}
+    """InputError where a metric has a name that is taken."""
     for row in metrics:
-        if row.name in taken:
+        if row.name in taken_names():
             raise InputError(f"scores.json has something else called '{row.name}': give the metric "
                              "another name")
 

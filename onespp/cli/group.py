@@ -19,6 +19,7 @@ from onespp.render.cli.terminal import run as run_command
 from .doctor import doctor
 from .hard import hard
 from .lead import lead
+from .new import new
 from .run import run
 from .scenes import scenes
 
@@ -30,7 +31,7 @@ def app() -> None:
 
 
 for command in (scenes, render, denoise, time_, score, run, report, compare, bench, tune, ablate,
-                lead, truth, hard, import_, export, doctor):
+                lead, truth, hard, import_, export, new, doctor):
     app.add_command(command)
 
 
