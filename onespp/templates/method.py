@@ -17,7 +17,7 @@ from onespp.render.frame import Frame
 
 @dataclass(frozen=True)
 class MyFilter:
-    """Averages each pixel with those around it that show the same object.
+    """Averages the light of each pixel with that of those around it that show the same object.
 
     The fields are the parameters, for `--set`. A value that cannot be is refused when the method is
     built.
@@ -29,7 +29,7 @@ class MyFilter:
     radius: int = 1
 
     # The channels that a frame must have. Without this line: all that it has.
-    needs = ("color", "id")
+    needs = ("color", "albedo", "id")
 
     def __post_init__(self) -> None:
         if self.radius < 1:
@@ -40,15 +40,17 @@ class MyFilter:
 
     def __call__(self, frame: Frame, state: None) -> tuple[np.ndarray, None]:
         """The image of a frame, (h, w, 3) float32 linear radiance, and the state for the next."""
-        color, ids = frame["color"], frame["id"]  # (h, w, 3) float32, (h, w) int32; not to write to
+        # (h, w, 3) float32, (h, w, 3) float32, (h, w) int32; none of them to be written to
+        color, albedo, ids = frame["color"], frame["albedo"], frame["id"]
         height, width = ids.shape
         r = self.radius
-        padded = np.pad(color, ((r, r), (r, r), (0, 0)))
-        padded_ids = np.pad(ids, r, constant_values=-2)  # no object has this number: weight 0
+        texture = np.maximum(albedo, 0.01)  # not to be blurred: taken out, and put back below
+        light = np.pad(color / texture, ((r, r), (r, r), (0, 0)))
+        others = np.pad(ids, r, constant_values=-2)  # no object has this number: weight 0
         sums, weights = np.zeros_like(color), np.zeros((height, width, 1), np.float32)
         for y in range(2 * r + 1):
             for x in range(2 * r + 1):
-                same = (padded_ids[y:y + height, x:x + width] == ids)[..., None]
-                sums += same * padded[y:y + height, x:x + width]
+                same = (others[y:y + height, x:x + width] == ids)[..., None]
+                sums += same * light[y:y + height, x:x + width]
                 weights += same
-        return sums / weights, state
+        return texture * sums / weights, state

@@ -33,7 +33,7 @@ def test_the_files_run_from_scene_to_score(call):
     assert call("score", "made", "--metric", "edges.py", "--no-pictures")[0] == 0
     scores = read_scores(Path("made/scores.json"))
     methods = {name: method["psnr_srgb"] for name, method in scores.methods.items()}
-    assert methods["box_blur"] > methods["input"] + 1
+    assert methods["box_blur"] > methods["input"] + 1, methods
     assert scores.methods["box_blur"]["edges"] < scores.methods["input"]["edges"]
     assert scores.measures["edges"].label == "edges"
     assert "class BoxBlur:" in Path("box_blur.py").read_text()
