@@ -36,7 +36,7 @@ def write_new(kind: str, name: str) -> Path:
     template = text = (Path(__file__).parent / f"{kind}.py").read_text("utf-8")
     for old, new in (("my_filter", stem), ("MyFilter", _capitals(stem)), ("my_metric", stem),
                      ("my metric", stem.replace("_", " ")), ("my_scene", stem)):
-        if old in template and kind != "scene" and re.search(rf"\b{new}\b", template):
+        if new != old in template and kind != "scene" and re.search(rf"\b{new}\b", template):
             raise InputError(f"'{new}' is a name that the file uses for something else: use "
                              "another name")
         text = text.replace(old, new)

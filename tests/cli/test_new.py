@@ -67,6 +67,13 @@ def test_a_file_goes_into_a_folder_that_is_there(call):
     assert Path("filters/blur.py").is_file()
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_names_of_the_examples_can_be_used(call, kind):
+    name = {"method": "my_filter"}.get(kind, f"my_{kind}")
+    assert call("new", kind, name)[0] == 0
+    assert Path(f"{name}.py").is_file()
+
+
 @pytest.mark.parametrize(("kind", "name", "words"), [
     ("method", "there", "there.py is there already"),
     ("method", "no/blur", "there is no folder no"),
