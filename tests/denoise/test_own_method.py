@@ -12,6 +12,7 @@ from onespp.denoise.catalog import build, changed, name_of, parameters, source_o
 from onespp.denoise.own_method import OwnMethod, result_name
 from onespp.denoise.run.sequence import denoise_sequence
 from onespp.denoise.score.sequence import score
+from onespp.denoise.studies.hard_scenes import judge
 from onespp.render.errors import InputError
 from tests.support.frames import make_frame
 from tests.support.report_sequence import make_report_sequence
@@ -352,3 +353,23 @@ def test_a_class_that_is_no_dataclass_has_no_parameters(write, sequence, call):
     assert (code, "since it is no dataclass" in error) == (2, True)
     code, _, error = call("tune", sequence.folder, "--method", path)
     assert (code, "has no parameter to search" in error) == (2, True)
+
+
+# What a study asks of it
+
+
+def test_a_state_that_is_written_to_is_a_new_one_for_each_frame_alone(write, sequence):
+    """`hard` compares a method with the same without a history."""
+    path = write(HALF.replace('self.gain if self.on else 1', '1 / state["frames"]'))
+    _, row = judge(sequence, "made", None, False, methods={"mine": build(path)})
+    first, second = row.psnr
+    assert row.method == "mine"
+    assert row.alone == pytest.approx((first, row.alone[1]))
+    assert abs(row.alone[1] - second) > 1
+
+
+def test_hard_takes_it(write, tmp_path, call):
+    code, text, error = call("hard", "tiny", "--method", write(HALF), "--reference-spp", 4,
+                             "--out", tmp_path / "hard")
+    assert code == 0, error
+    assert "| PSNR, dB (mean over frames) | input | my_filter |" in text
