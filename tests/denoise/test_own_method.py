@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -102,6 +103,31 @@ def test_neighbours_can_be_imported_in_every_call(write):
                          "        return gain() * frame['color'], 0"))
     for _ in range(2):
         np.testing.assert_allclose(once(method), 3 * make_frame(6, 8)["color"])
+
+
+def test_neighbours_are_the_same_modules_from_call_to_call(write):
+    write("seen = []", "parts.py")
+    method = build(write(BARE + "import parts; parts.seen.append(1)\n"
+                         "        return len(parts.seen) * frame['color'], 0"))
+    once(method)
+    np.testing.assert_allclose(once(method), 2 * make_frame(6, 8)["color"])
+    assert "parts" not in sys.modules
+
+
+def test_a_library_that_lies_deeper_in_the_folder_is_no_neighbour(write, tmp_path, monkeypatch):
+    """As Python's own does where it is in the home folder, and the file too."""
+    write("", "lib/some_library.py")
+    monkeypatch.syspath_prepend(str(tmp_path / "own/lib"))
+    build(write("import some_library\n" + HALF))
+    assert sys.modules.pop("some_library").__name__ == "some_library"
+
+
+def test_a_network_is_no_method_though_it_can_be_called(write):
+    write("class Module:\n    def __call__(self, x): return self.forward(x)", "networks.py")
+    path = write("from networks import Module\n"
+                 "class Net(Module):\n    def forward(self, x): return 2 * x\n"
+                 + BARE + "return Net()(frame['color']), state")
+    np.testing.assert_allclose(once(build(path)), 2 * make_frame(6, 8)["color"])
 
 
 class Unique:
