@@ -79,13 +79,15 @@ class OwnMethod:
             return self.method.init(height, width)
 
     def __call__(self, frame: Frame, state: Any) -> tuple[np.ndarray, Any]:
-        """(h, w, 3) float32 radiance, and the user's state.
+        """(h, w, 3) float32 radiance, and the user's state; None begins.
 
         Raises:
             InputError: it raises, or returns something else.
         """
         if not isinstance(frame, Frame):
             raise InputError(f"a method was called with a {type(frame).__name__}: give it a Frame")
+        if state is None:
+            state = self.init(frame.height, frame.width)
         with self.code.running():
             returned = self.method(read_only(frame), state)
         if not isinstance(returned, tuple) or len(returned) != 2:
