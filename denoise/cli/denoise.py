@@ -18,6 +18,7 @@ from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import command_line, note, progress
 from onespp.render.errors import InputError
 from onespp.render.files.lock import writing
+from onespp.render.files.manifest import check_result_name
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.games202.layout import gaps
 
@@ -106,6 +107,7 @@ def check_methods(methods: tuple[str, ...], channels: tuple[str, ...]) -> None:
     from onespp.denoise.catalog import check_not_a_method, name_of
 
     for name, method in built(method_names(methods)).items():
+        check_result_name(name)
         check_not_a_method(name, name_of(method))
         _check_replay(name, method.needs, channels, "this run")
 

@@ -250,9 +250,12 @@ def test_every_command_that_names_a_method_takes_a_file(write, sequence, call, t
     assert (code, text.startswith("| `atrous` and `my_filter` |")) == (0, True)
 
 
-def test_a_file_that_fails_is_said_before_a_run_renders(write, tmp_path, call):
-    code, _, error = call("run", "box", "--out", tmp_path / "run", "--method", write("1 / 0"))
-    assert (code, "ZeroDivisionError" in error) == (2, True)
+@pytest.mark.parametrize(("text", "name", "words"), [
+    ("1 / 0", "my_filter.py", "ZeroDivisionError"), (HALF, "svgf.py", "is the name of a method"),
+    (HALF, "reference.py", "cannot be the name of results")])
+def test_what_cannot_be_run_is_said_before_a_run_renders(write, tmp_path, call, text, name, words):
+    code, _, error = call("run", "box", "--out", tmp_path / "run", "--method", write(text, name))
+    assert (code, words in error) == (2, True)
     assert not (tmp_path / "run").exists()
 
 
