@@ -19,7 +19,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 ROOMS = (
-    "onespp.__main__", "onespp.cli", "onespp.denoise.cli", "onespp.render.cli",
+    "onespp.__main__", "onespp.cli", "onespp.templates", "onespp.denoise.cli", "onespp.render.cli",
     "onespp.denoise.report", "onespp.denoise.bench", "onespp.denoise.studies",
     "onespp.denoise.run", "onespp.denoise.score",
     "onespp.denoise.catalog", "onespp.denoise.peers",
@@ -37,6 +37,7 @@ ROOMS = (
     "onespp.scenes.catalog", "onespp.scenes.generated", "onespp.scenes.hard", "onespp.scenes.room",
     "onespp.scenes",
     "onespp",
+    "onespp.entry_points", "onespp.user_code",
 )
 MOST_FILES = 12
 ONLY_IN = {  # package -> rooms that may import it

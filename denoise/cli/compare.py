@@ -30,8 +30,9 @@ def compare(a: Path, b: Path, methods: tuple[str, ...], thresholds: tuple[str, .
     from onespp.denoise.score.compare import comparison, parse_thresholds
     from onespp.denoise.score.scorecard import read_scores
 
-    found = comparison(read_scores(a), read_scores(b), list(methods) or None,
-                       parse_thresholds(thresholds))
+    old, new = read_scores(a), read_scores(b)
+    found = comparison(old, new, list(methods) or None,
+                       parse_thresholds(thresholds, {**old.own_metrics, **new.own_metrics}))
     show_or_print(found.json_text(), json_to, lambda: print_comparison(found, show_all))
     if found.failed:
         sys.exit(1)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from onespp.denoise.own_method import result_name
 from onespp.denoise.score.scorecard import INPUT
 from onespp.render.cli.terminal import command_line, progress
 from onespp.render.files.lock import writing
@@ -18,6 +19,9 @@ from .options import json_option, show_or_print
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--method", "methods", multiple=True, metavar="NAME",
               help="Score these alone; default all that have results.")
+@click.option("--metric", "metrics", multiple=True, metavar="NAME",
+              help="Also measure this one: a file of your own, as my_metric.py or "
+              "my_metric.py:edge_error, or an installed one; may be given several times.")
 @json_option
 @click.option("--pictures/--no-pictures", default=True, show_default=True,
               help="Draw contact sheets, plot and movie.")
@@ -29,16 +33,17 @@ from .options import json_option, show_or_print
 @click.option("--seeds", multiple=True, type=click.Path(path_type=Path), metavar="DIR",
               help="A render of the same with another --seed, denoised alike: splits the error "
               "into bias and variance; may be given several times.")
-def score(folder: Path, methods: tuple[str, ...], json_to: str | None, pictures: bool,
-          movie: bool | None, by_cause: bool, seeds: tuple[Path, ...]) -> None:
+def score(folder: Path, methods: tuple[str, ...], metrics: tuple[str, ...], json_to: str | None,
+          pictures: bool, movie: bool | None, by_cause: bool, seeds: tuple[Path, ...]) -> None:
     """Score what the sequence in FOLDER holds; write scores.json, scores.csv and pictures."""
-    score_in(folder, methods, json_to, pictures, by_cause, seeds, movie)
+    score_in(folder, methods, json_to, pictures, by_cause, seeds, movie, metrics)
 
 
 def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = None,
              pictures: bool = True, by_cause: bool = False, seeds: tuple[Path, ...] = (),
-             movie: bool | None = None) -> None:
+             movie: bool | None = None, metrics: tuple[str, ...] = ()) -> None:
     """Do what the options of `score` ask."""
+    from onespp.denoise.metrics.own_metric import own_metrics
     from onespp.denoise.report.contact_sheets import draw_pictures
     from onespp.denoise.report.movie import require_av
     from onespp.denoise.report.terminal import print_classes, print_scores, print_splits
@@ -47,12 +52,15 @@ def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = 
     if movie:
         require_av()
     sequence = FrameSequence.open(folder)
+    own = own_metrics(metrics)
     others = [FrameSequence.open(other) for other in seeds]
     with writing(folder, "score"), progress() as report:
-        scores = score_sequence(sequence, list(methods) or None, report, others, command_line())
+        scores = score_sequence(sequence, list(methods) or None, report, others, command_line(),
+                                own)
         if pictures:  # after the scores, which are on disk whatever happens here
-            trouble = draw_pictures(sequence, scores, [m for m in methods if m != INPUT] or None,
-                                    report, movie=movie is not False)
+            drawn = [result_name(m) for m in methods if m != INPUT]
+            trouble = draw_pictures(sequence, scores, drawn or None, report,
+                                    movie=movie is not False)
             scores = scores.model_copy(update={"notes": [*scores.notes, *trouble]})
 
     def show() -> None:

@@ -11,7 +11,7 @@ from onespp.render.cli.terminal import command_line, progress
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import FrameSequence
 
-from .denoise import _names
+from .denoise import built, method_names
 from .options import json_option, show_or_print
 
 
@@ -30,11 +30,12 @@ def time_(folder: Path, methods: tuple[str, ...], frames: int, rounds: int, json
           device: str, threads: int | None) -> None:
     """Time methods in turns on the sequence in FOLDER; `score` then uses these times."""
     use(device, threads)
-    from onespp.denoise.catalog import build
+    from onespp.denoise.catalog import name_of
     from onespp.denoise.run.interleaved_timing import time_methods
 
     sequence = FrameSequence.open(folder)
-    chosen = {name: build(name) for name in _names(methods)}
+    chosen = {name_of(method) or name: method
+              for name, method in built(method_names(methods)).items()}
     with writing(folder, "time"), progress() as report:
         times = time_methods(sequence, chosen, frames, rounds, report, command_line())
 

@@ -40,16 +40,19 @@ def tune(folders: tuple[Path, ...], method: str, names: tuple[str, ...],
     from onespp.denoise.catalog import build
     from onespp.denoise.studies.tune import Search, read_case, starting_point
 
-    start = starting_point(method, pairs(settings), note)
-    renamed = renamed_parameters(build(method))
-    names = tuple(with_present_names(dict.fromkeys(names), renamed, note))
+    denoiser = build(method, pairs(settings), note=note)
+    start = starting_point(denoiser)
+    names = tuple(with_present_names(dict.fromkeys(names), renamed_parameters(denoiser), note))
     unknown = [name for name in names if name not in start]
     if unknown:
         raise InputError(f"method '{method}' has no parameter '{unknown[0]}': "
-                         f"it has {', '.join(start)}")
-    cases = [read_case(FrameSequence.open(folder), build(method)) for folder in folders]
+                         f"it has {', '.join(start) or 'none'}")
+    if not start:
+        raise InputError(f"method '{method}' has no parameter to search: give it one, the field of "
+                         "a dataclass that is a number, or true or false")
+    cases = [read_case(FrameSequence.open(folder), denoiser) for folder in folders]
     with progress() as report:
-        search = Search(method, start, cases, out, report)
+        search = Search(denoiser, cases, out, report)
         found, value = search.run(list(names) or list(start))
     changed = {k: v for k, v in found.items() if v != start[k]}
 

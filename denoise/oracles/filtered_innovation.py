@@ -61,7 +61,7 @@ def turn_of(previous: Frame, frame: Frame) -> np.ndarray:
     back = np.array([before @ np.linalg.inv(now) for before, now in zip(
         previous.world_from_object, frame.world_from_object)])[ids]
     x, n = frame["position"].astype(float), frame["normal"].astype(float)
-    x_before = np.einsum("hwij,hwj->hwi", back, np.concatenate([x, 0 * x[..., :1] + 1], -1))[..., :3]
+    x_before = np.einsum("hwij,hwj->hwi", back[..., :3, :3], x) + back[..., :3, 3]
     n_before = np.einsum("hwji,hwj->hwi", np.linalg.inv(back[..., :3, :3]), n)
 
     def mirrored(of: Frame, x: np.ndarray, n: np.ndarray) -> np.ndarray:

@@ -8,14 +8,11 @@ from rich.console import Console
 from rich.table import Table
 
 from onespp.denoise.metrics.metric import Metric
-from onespp.denoise.metrics.table import HEADLINE, MEASURES
+from onespp.denoise.metrics.table import HEADLINE
 from onespp.denoise.score.causes import CAUSES, HISTORIES
 from onespp.denoise.score.scorecard import INPUT, ClassScore, MethodScore, Scores
 
 PLAIN_WIDTH = 100
-
-_COLUMNS = [row for row in MEASURES.values() if row.in_table]
-
 
 def print_scores(scores: Scores, console: Console | None = None) -> None:
     """Table, caption and notes. In a pipe or a log, plain and 100 columns wide."""
@@ -47,7 +44,7 @@ def cells(scores: Scores, name: str) -> dict[str, str]:
     # (Only the headline's error is shown: the others' are in the files, and tables stay narrow.)
     row = {_heading(m): m.text(method[m.name],
                                method.errors.get(m.name) if m is HEADLINE else None,
-                               m.name in method.bounds) for m in _COLUMNS}
+                               m.name in method.bounds) for m in _columns(scores)}
     gain = None if name == INPUT else _gain(scores, method)
     row[f"gain ({HEADLINE.unit})"] = _number(gain, "+.2f")
     row["ms/frame"] = _number(method.ms_per_frame, ".1f")
@@ -114,6 +111,10 @@ def caption(scores: Scores) -> str:
     return "; ".join([*parts, "time: median after the first frame, without files"]) + "."
 
 
+def _columns(scores: Scores) -> list[Metric]:
+    return [row for row in scores.measures.values() if row.in_table]
+
+
 def _heading(metric: Metric) -> str:
     return f"{metric.label} ({metric.unit})" if metric.unit else metric.label
 
@@ -153,7 +154,7 @@ def _difference(scores: Scores, method: MethodScore) -> float | None:
 def _best(scores: Scores) -> set[tuple[str, str]]:
     """(method, heading) of the best value of each metric."""
     found = set()
-    for metric in _COLUMNS:
+    for metric in _columns(scores):
         values = {name: value for name, method in scores.methods.items()
                   if (value := method[metric.name]) is not None}
         if len(values) > 1:

@@ -9,12 +9,17 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, FiniteFloat, field_validator, model_serializer
 
+from onespp.denoise.metrics.metric import Metric
+from onespp.denoise.metrics.own_metric import FORMAT, source_of
 from onespp.denoise.metrics.table import ESTIMATED, HEADLINE, MEASURES
+from onespp.denoise.own_method import result_name
+from onespp.render.errors import InputError
 from onespp.render.files.json_file import JsonFile, format_json, read_json
 
 INPUT = "input"
@@ -49,6 +54,31 @@ class FrameScore(Measured):
     ms: FiniteFloat | None
     non_finite_pixels: int
     errors: dict[str, FiniteFloat] = Field(default_factory=dict)
+
+
+class OwnMetric(JsonFile):
+    """What a metric of one's own said of itself, as `Metric` does, for who reads its values.
+
+    Attributes:
+        source: hash of the file that it was in; "" of an installed one.
+    """
+
+    label: str
+    unit: str
+    higher_is_better: bool
+    format: Annotated[str, Field(pattern=f"^{FORMAT}$")]
+    about: str
+    source: str = ""
+
+    @classmethod
+    def of(cls, row: Metric) -> OwnMetric:
+        return cls(label=row.label, unit=row.unit, higher_is_better=row.higher_is_better,
+                   format=row.format, about=row.about, source=source_of(row))
+
+    def metric(self, name: str) -> Metric:
+        """All of it but the function: its values can be read, and no others made."""
+        return Metric(name, self.label, lambda a, b: None, "", self.unit, self.higher_is_better,
+                      self.format, self.about)
 
 
 class ClassScore(JsonFile):
@@ -143,6 +173,7 @@ class Scores(JsonFile):
             as they were typed, in that order; those that were not recorded are missing.
         tone_map: what "srgb" means in the names of metrics.
         notes: what a reader must know, one sentence each.
+        own_metrics: name -> what is known of each metric that is not of the table.
     """
 
     scene: str
@@ -163,6 +194,7 @@ class Scores(JsonFile):
     machine: str = ""
     commands: list[str] = Field(default_factory=list)
     notes: list[str]
+    own_metrics: dict[str, OwnMetric] = Field(default_factory=dict)
     methods: dict[str, MethodScore]
 
     @field_validator("methods")
@@ -171,6 +203,11 @@ class Scores(JsonFile):
         if INPUT not in methods:
             raise ValueError(f"'{INPUT}', which methods are compared with, is missing")
         return methods
+
+    @property
+    def measures(self) -> dict[str, Metric]:
+        """Every measure that may have a value: those of the table, and the user's own."""
+        return {**MEASURES, **{name: m.metric(name) for name, m in self.own_metrics.items()}}
 
     @property
     def has_reference(self) -> bool:
@@ -190,7 +227,7 @@ class Scores(JsonFile):
     def label(self, name: str) -> str:
         """A method's name for a table, with what ran where that is something else."""
         ran = self.methods[name].method
-        return f"{name} ({ran})" if ran not in ("", name) else name
+        return f"{name} ({ran})" if ran and result_name(ran) != name else name
 
     def ordered(self) -> list[str]:
         """Names of the methods: input, then from fast to slow, then those without a time."""
@@ -207,14 +244,29 @@ class Scores(JsonFile):
         """One row for each method and frame."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(["method", "frame", *MEASURES, "ms", "reference_floor_db",
+        measures = self.measures
+        writer.writerow(["method", "frame", *measures, "ms", "reference_floor_db",
                          "non_finite_pixels", *(f"{m}_error" for m in ESTIMATED)])
         for name, method in self.methods.items():
             for row in method.per_frame:
-                writer.writerow([name, row.frame, *(row[m] for m in MEASURES), row.ms,
+                writer.writerow([name, row.frame, *(row[m] for m in measures), row.ms,
                                  self.reference_floor_per_frame.get(row.frame),
                                  row.non_finite_pixels, *(row.errors.get(m) for m in ESTIMATED)])
         return text.getvalue()
+
+
+def taken_names() -> set[str]:
+    """Names that mean something else in files of scores."""
+    return {*MEASURES, *FrameScore.model_fields, *MethodScore.model_fields, "method", "frame",
+            "reference_floor_db", *(f"{m}_error" for m in ESTIMATED)}
+
+
+def check_own(metrics: Iterable[Metric]) -> None:
+    """InputError where a metric has a name that is taken."""
+    for row in metrics:
+        if row.name in taken_names():
+            raise InputError(f"scores.json has something else called '{row.name}': give the metric "
+                             "another name")
 
 
 def read_scores(path: Path) -> Scores:

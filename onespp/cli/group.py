@@ -21,6 +21,7 @@ from .completion import completion
 from .doctor import doctor
 from .hard import hard
 from .lead import lead
+from .new import new
 from .run import run
 from .scenes import scenes
 
@@ -38,7 +39,7 @@ def app() -> None:
 
 
 for command in (scenes, render, denoise, time_, score, run, report, view, compare, bench, tune,
-                ablate, lead, truth, hard, import_, export, doctor,
+                ablate, lead, truth, hard, import_, export, new, doctor,
                 completion):
     command.epilog = EXIT_CODES.get(command.name or "", EXIT_CODES[""])
     app.add_command(command)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from onespp.denoise.cli.denoise import denoise_in
+from onespp.denoise.own_method import result_name
 from onespp.render.cli.figures import json_option, show_or_print
 from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.render import render_to
@@ -55,7 +56,7 @@ def lead(folders: tuple[Path, ...], method: str, peer: str, suite: bool, scenes:
          json_to: str | None, device: str, threads: int | None) -> None:
     """Print how far a method is ahead of a peer, from the scores of pairs of folders."""
     if not suite:
-        _pairs(folders, method, peer, json_to)
+        _pairs(folders, result_name(method), result_name(peer), json_to)
         return
     if folders:
         raise InputError("--suite takes no folders: it renders its own into --out")
@@ -117,8 +118,8 @@ def _suite(method: str, pattern: re.Pattern[str], out: Path, size: str | None, f
                 rendered = _plain(rendered, out / "plain" / scene)
             scored[scene] = _scored(rendered, method, group.peers)
         found[group] = scored
-    show_or_print(figures(method, found), json_to,
-                  lambda: click.echo(markdown(method, found)))
+    show_or_print(figures(result_name(method), found), json_to,
+                  lambda: click.echo(markdown(result_name(method), found)))
 
 
 def _scored(sequence: FrameSequence, method: str, peers: tuple[str, ...]) -> Scores:
@@ -130,7 +131,8 @@ def _scored(sequence: FrameSequence, method: str, peers: tuple[str, ...]) -> Sco
         sequence.has_result(peer, i) for i in sequence.frames)]
     denoise_in(sequence.folder, (*missing, *({method} - {*missing})))
     with writing(sequence.folder, "score"):
-        return score(sequence, list(dict.fromkeys((method, *peers))), command=command_line())
+        return score(sequence, list(dict.fromkeys((result_name(method), *peers))),
+                     command=command_line())
 
 
 def _plain(sequence: FrameSequence, folder: Path) -> FrameSequence:
