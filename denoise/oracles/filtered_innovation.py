@@ -44,9 +44,10 @@ def signals_of(frame: Frame) -> dict[str, np.ndarray]:
         chance = np.where(chance > 0, chance, np.inf)
     for name, v in told.items():
         light = light - v / chance * unshadowed[name]
-    bare = (texture_of(frame) >= 1).all(-1)  # all that is left is G
-    bare &= roughness_of(frame) < 1 if "roughness" in frame else False
-    mirrored = np.where(bare[..., None], light, 0)
+    mirrored = np.zeros_like(light)
+    if "roughness" in frame:  # where nothing is diffuse, all that is left is G
+        bare = (texture_of(frame) >= 1).all(-1) & (roughness_of(frame) < 1)
+        mirrored = np.where(bare[..., None], light, 0)
     return {"L": (light - mirrored) / texture_of(frame),
             "G": frame["specular"] + mirrored, **told}
 
