@@ -2,14 +2,17 @@
 
 It gets HDR colour, and albedo and normal where a frame has an albedo; the temporal form also where
 each pixel was in the frame before, and its own last result. Not measured by us: no figure of ours
-stands on it.
+stands on it. Its weights come with the driver; where they are missing (as in many containers) the
+library ends the process, so they are looked for before.
 
 The one part of `denoise/` that needs Mitsuba, which it imports when used.
 """
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,6 +23,13 @@ from onespp.denoise.inputs.surface import GUIDES
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.host import backend
+
+WEIGHTS = Path("/usr/share/nvidia/nvoptix.bin")
+"""Where the driver for Linux keeps the network."""
+
+
+def has_weights() -> bool:
+    return sys.platform != "linux" or WEIGHTS.exists()
 
 
 @dataclass(frozen=True)
@@ -35,10 +45,14 @@ class Optix:
     temporal: bool = False
 
     def init(self, height: int, width: int) -> OptixState:
-        """Raises InputError where there is no CUDA device or the size is empty."""
+        """Raises InputError where there is no CUDA device, its driver has no weights, or the size is
+        empty."""
         if backend.choose() != "cuda":
             raise InputError("the OptiX denoiser needs a CUDA device, and kernels run on the "
                              "CPU: `onespp doctor` says why")
+        if not has_weights():
+            raise InputError(f"the OptiX denoiser needs its network, {WEIGHTS}, which NVIDIA's "
+                             "driver brings: install all of the driver here")
         if height < 1 or width < 1:
             raise InputError(f"an image of {width}x{height} pixels is empty")
         import mitsuba as mi

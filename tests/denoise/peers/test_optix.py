@@ -8,14 +8,26 @@ import numpy as np
 import pytest
 
 from onespp.denoise.catalog import build
+from onespp.denoise.peers import optix
 from onespp.denoise.peers.optix import _flow
+from onespp.render.errors import InputError
 from onespp.render.host.cuda_driver import has_cuda
 from tests.support.frames import make_frame, noisy
 
 H, W = 64, 80
 
-needs_cuda = pytest.mark.skipif(not has_cuda() or os.environ.get("ONESPP_DEVICE") == "llvm",
-                                reason="not run: no CUDA device")
+needs_cuda = pytest.mark.skipif(
+    not has_cuda() or os.environ.get("ONESPP_DEVICE") == "llvm" or not optix.has_weights(),
+    reason="not run: no CUDA device, or no weights of OptiX")
+
+
+def test_a_driver_without_the_network_is_said_in_a_sentence(monkeypatch, tmp_path):
+    """OptiX itself would end the process."""
+    monkeypatch.setattr(optix.backend, "choose", lambda: "cuda")
+    monkeypatch.setattr(optix.sys, "platform", "linux")
+    monkeypatch.setattr(optix, "WEIGHTS", tmp_path / "nvoptix.bin")
+    with pytest.raises(InputError, match=r"nvoptix\.bin.*driver"):
+        build("optix").init(H, W)
 
 
 @needs_cuda
