@@ -45,8 +45,8 @@ class Optix:
     temporal: bool = False
 
     def init(self, height: int, width: int) -> OptixState:
-        """Raises InputError where there is no CUDA device, its driver has no weights, or the size is
-        empty."""
+        """InputError where there is no CUDA device or no network in its driver, or an empty size.
+        """
         if backend.choose() != "cuda":
             raise InputError("the OptiX denoiser needs a CUDA device, and kernels run on the "
                              "CPU: `onespp doctor` says why")
