@@ -18,10 +18,11 @@ halved once more: its colours are over albedo, and noisy. What is as large all a
 the mean is far larger than what happens around (a quiet place near a change), it is none of the
 place's own.
 
-Nothing in n is of the pixel alone but c, or where noise is high a would be too, and the mean of the
-history would be off. Light has one length and visibility another, for each is renewed by what the
-other does not see. Of a sparse signal N is v (1 - v), D = max(c, 0)^2 (S[e] / S[omega])^2, and what
-is limited is the sum of omega.
+All of it is of the surroundings: were n of the pixel's own noise, a would go with it, and the mean
+of the history be off (3 % of energy too much with n of h itself).
+
+Of a sparse signal N is v (1 - v), D = max(c, 0)^2 (S[e] / S[omega])^2, and what is limited is the
+sum of omega.
 """
 
 # pyright: standard

@@ -21,7 +21,8 @@ and a signal takes the share f of it:
 
     s^2 <- (1 - a)^2 s^2 + a^2 s_0^2,   s_0^2 = max(W[l(e)^2] - s^2, W[l(e)^2] / 4)
 
-with W the first `ENERGY_LEVELS` levels of S: unlike the variance of d in a window, that of e has
+with W the first `ENERGY_LEVELS` levels of S, and n no more than a change leaves (`change.py`):
+unlike the variance of d in a window, that of e has
 no shadow's edge in it that stands still. Without history s_0^2 comes from what a small smoothing
 takes out of l(d): `spatial_variances`.
 
