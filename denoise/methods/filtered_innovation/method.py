@@ -107,7 +107,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     sharp_min_gain: float = 0.75
     change_alpha: float = 0.6
     light_change: float = 8.0
-    glossy_change: float = 16.0
+    glossy_change: float = 4.0
     visibility_change: float = 8.0
     innovation_levels: int = 5
     output_levels: int = 4
