@@ -310,30 +310,33 @@ def run(frames: list[Frame], m) -> np.ndarray:
     """The colour of the last frame."""
     sharp_levels = m.sharp_innovation_levels, m.sharp_output_levels
     settings = {
-        "L": (m.light_alpha, m.innovation_levels, m.output_levels, m.light_sigma),
-        "G": (m.light_alpha, *sharp_levels, m.light_sigma)}
-    visible = m.visibility_alpha, *sharp_levels, m.visibility_sigma
+        "L": (m.light_alpha, m.innovation_levels, m.output_levels, m.light_sigma, m.light_change),
+        "G": (m.light_alpha, *sharp_levels, m.light_sigma, m.glossy_change)}
+    visible = m.visibility_alpha, *sharp_levels, m.visibility_sigma, m.visibility_change
     kept: dict[str, tuple[np.ndarray, ...]] = {}  # h, s^2 and N
     energy = np.zeros(0)
-    length, previous, out = np.zeros(0), None, {}
+    lengths: dict[str, np.ndarray] = {}  # by what has one, see `length_of`
+    previous, out = None, {}
     for frame in frames:
         found = np.zeros(frame["id"].shape, bool)
-        n = np.ones(frame["id"].shape)
+        signals = signals_of(frame)
+        ns = {length_of(frame, name): np.ones(found.shape) for name in signals}
         if previous is not None:
-            old, found = look_up(previous, frame, length[..., None], m)
-            n = np.where(found, np.minimum(old[..., 0] + 1, m.max_history_length), 1)
-        out = {}
-        for name, d in signals_of(frame).items():
-            alpha, smoothing, levels, sigma = settings.get(name, visible)
+            for key, length in lengths.items():
+                old, found = look_up(previous, frame, length[..., None], m)
+                ns[key] = np.where(found, np.minimum(old[..., 0] + 1, m.max_history_length), 1)
+        parts, out = {}, {}
+        for name, d in signals.items():
+            _, smoothing, *_, p = settings.get(name, visible)
             sparse = name.isdigit()
-            levels = max(levels - 1, 1) if sparse else levels
             told = frame["group"] == int(name) if sparse else np.ones(found.shape, bool)
             omega = told * frame["group_sample"][..., 1].astype(float) if sparse else 1.0 * told
             follows = m.follow_shadows and "light" in frame and (
                 sparse or (name == "V" and "group" not in frame))
             lone = np.minimum(d / np.maximum(omega, 0.1)[..., None], 2)
-            noise = (sample_variance(frame, lone[..., 0], omega > 0, m) if sparse
-                     else spatial_variance(frame, d, m))
+            spatial = (sample_variance(frame, lone[..., 0], omega > 0, m) if sparse
+                       else spatial_variance(frame, d, m))
+            energy = np.zeros(found.shape)
             e, s2, h, samples = np.zeros_like(d), np.zeros(found.shape), 0 * d, 0 * omega
             here = np.where(found, omega, 0) if sparse else omega
             if previous is not None:
@@ -366,39 +369,52 @@ def run(frames: list[Frame], m) -> np.ndarray:
                     s2 = np.where(better & moves, both[..., -1], s2)
                     h = np.where((better & moves)[..., None], there, h)
                     energy = np.maximum(energy + np.minimum(excess[..., 0], 0), 0)
-                same = found
-                if name == "G" and "roughness" in frame:
-                    turn = turn_of(previous, frame)
-                    alpha, same = np.where(found, np.maximum(alpha, turn), alpha), (
-                        found & (turn <= 0.5))
-                noise = np.where(same, np.maximum(energy - s2, energy / 4), noise)
-            a = np.maximum(1 / n, alpha)
-            follow = np.maximum(m.sharp_min_gain, a)
+            turn, change = np.zeros(found.shape), wide
+            if name == "G" and "roughness" in frame and previous is not None:
+                turn = np.where(found, turn_of(previous, frame), 0)
             if sparse:
-                a = np.where(found, np.maximum(1 / (samples + omega + 0.5), alpha), 1)
+                norm = norm_of(frame, here, found, smoothing, m, narrow)[..., None]
+                change = np.clip(h + norm * wide, -0.5, 2) - h
+            left = length_left(name, wide, q, energy, change, h, p, m)
+            if not sparse:
+                key = length_of(frame, name)
+                ns[key] = np.maximum(np.minimum(ns[key], np.where(found, left, 1)), 1)
+            parts[name] = (e, h, wide, q, energy, s2, samples, omega, here, lone, change, left,
+                           spatial, narrow, turn)
+        for name, d in signals.items():
+            (e, h, wide, q, energy, s2, samples, omega, here, lone, change, left, spatial,
+             narrow, turn) = parts[name]
+            alpha, _, levels, sigma, _ = settings.get(name, visible)
+            sparse = name.isdigit()
+            levels = max(levels - 1, 1) if sparse else levels
+            n = np.ones(0) if sparse else ns[length_of(frame, name)]
+            known = np.minimum(samples, left)
+            a = (np.maximum(1 / (known + omega + 0.5 * np.minimum(left, 1)), alpha) if sparse
+                 else np.maximum(np.maximum(1 / n, alpha), turn))
+            follow = np.maximum(m.sharp_min_gain, alpha)
             if name != "G":
                 certain = 1 - m.noise_threshold * q / np.maximum(lum(wide) ** 2, 1e-20)
                 follow = np.maximum(certain, m.min_gain if name == "L" else m.sharp_min_gain)
                 a = a if name == "L" else np.maximum(a, m.change_alpha * certain)
             if sparse:
-                norm = norm_of(frame, here, found, smoothing, m, narrow)[..., None]
-                change = np.clip(h + norm * wide, -0.5, 2) - h
-                mean = np.clip(h + change, 0, 1)[..., 0]
-                noise = np.where(found, np.maximum(mean * (1 - mean), 0.01), noise)
+                follow = np.maximum(follow, 1 - known)
+                noise = most = coin((h + change)[..., 0])
                 rest = e - here[..., None] * change
                 history = h + follow[..., None] * change + np.minimum(a, 1)[..., None] * rest
                 history = np.where(found[..., None], history, np.where(omega[..., None] > 0,
                                                                        lone, 0.5))
-                samples = samples + omega
+                samples = known + omega
                 a = np.where(found, np.minimum(a * omega, 1), omega > 0)
             else:
+                noise, most = np.maximum(energy - s2, energy / 4), energy
                 follow = np.maximum(follow, a)
                 history = d - (1 - a)[..., None] * e + (follow - a)[..., None] * wide
-            s2 = (1 - a) ** 2 * s2 + a**2 * noise
+            noise = np.where((left < 2) | (turn > 0.5), np.minimum(spatial, most), noise)
+            s2 = (1 - a) ** 2 * s2 + a**2 * np.where(found, noise, spatial)
             if sparse:
                 s2 = np.where(samples <= 1e-5, 0.25, s2)
             fade = np.clip(1 - ((samples if sparse else n) - 1) / m.fade_frames, 0, 1)
-            sigmas = sigma + 0 * n
+            sigmas = sigma + np.zeros(found.shape)
             if name == "G" and "roughness" in frame:
                 least = min(m.mirror_sigma / sigma, 1)
                 sigmas = sigma * np.clip(roughness_of(frame) / 0.1, least, 1)
@@ -407,8 +423,39 @@ def run(frames: list[Frame], m) -> np.ndarray:
             if sparse:
                 history = np.where(samples[..., None] > 1e-5, history, out[name])
             kept[name] = history, s2, np.minimum(samples, 64)
-        length, previous = n, frame
+        lengths, previous = ns, frame
     return repaid(color_of(frames[-1], out), frames[-1]["id"])
+
+
+def length_of(frame: Frame, name: str) -> str:
+    """What a signal's history has its length in common with: sharp signals of one light."""
+    return name if "group" in frame or name == "L" else "sharp"
+
+
+def coin(visibility: np.ndarray) -> np.ndarray:
+    """The variance of a sample of a visibility."""
+    mean = np.clip(visibility, 0, 1)
+    return np.maximum(mean * (1 - mean), 0.01)
+
+
+def length_left(name: str, wide: np.ndarray, q: np.ndarray, energy: np.ndarray,
+                change: np.ndarray, h: np.ndarray, p: float, m) -> np.ndarray:
+    """n, or N, that a change of light leaves at most."""
+    luminance2 = size = lum(wide) ** 2
+    if name.isdigit():
+        certain = 1 - m.noise_threshold * q / np.maximum(size, 1e-20)
+        return coin((h + change)[..., 0]) / np.maximum(
+            p * (np.maximum(certain, 0) * change[..., 0]) ** 2, 1e-20)
+    if name != "V":
+        color = np.maximum(wide[..., 0] ** 2, wide[..., 2] ** 2 / 4)
+        size = np.maximum(size, color / 4 if name == "L" else color)
+    alike = np.minimum(luminance2, energy) / np.maximum(np.maximum(luminance2, energy), 1e-20)
+    q = energy / 24 if name == "G" else q
+    certain = 1 - m.noise_threshold * q * (1 - alike**4) / np.maximum(size, 1e-20)
+    size = size * np.maximum(certain, 0) ** 2
+    size = np.minimum(size, energy**2 / np.maximum(size, 1e-20))
+    noise = np.maximum(energy - size, energy / 16)
+    return np.where(size > 1e-20, noise / np.maximum(p * size, 1e-20), 1e6)
 
 
 def norm_of(frame: Frame, omega: np.ndarray, counts: np.ndarray, levels: int, m,

@@ -21,9 +21,9 @@ and a signal takes the share f of it:
 
     s^2 <- (1 - a)^2 s^2 + a^2 s_0^2,   s_0^2 = max(W[l(e)^2] - s^2, W[l(e)^2] / 4)
 
-with W the first `ENERGY_LEVELS` levels of S: unlike the variance of d in a window, that of e has
-no shadow's edge in it that stands still. Without history s_0^2 comes from what a small smoothing
-takes out of l(d): `spatial_variances`.
+with W the first `ENERGY_LEVELS` levels of S, and n no more than a change leaves (`change.py`):
+unlike the variance of d in a window, that of e has no shadow's edge in it that stands still.
+Without history s_0^2 comes from what a small smoothing takes out of l(d): `spatial_variances`.
 
 t tells how far a mirror direction has turned (`reflections.py`); where that is by more than half a
 lobe, s_0^2 of glossy light is as without history.
@@ -108,7 +108,8 @@ class Innovations(NamedTuple):
 
     Attributes:
         signals: e of each signal, 0 without history. energies: l(e)^2 of each.
-        length: n, 1 without history. variances: s^2 of each signal's history.
+        lengths: n, as `layout.length` says, 1 without history. variances: s^2 of each signal's
+            history.
         valid_inverse_depth: 1/z, far away without history.
         shadows: of the other history of each visibility that has one. footprint_falloffs: of
             `penumbra.py`, of each of those. sparse: of each sparse signal. turned: t of
@@ -117,7 +118,7 @@ class Innovations(NamedTuple):
 
     signals: list[Signal]
     energies: list[Float]
-    length: Float
+    lengths: list[Float]
     variances: list[Float]
     valid_inverse_depth: Float
     shadows: list[ShadowInnovation]
@@ -142,7 +143,7 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
     record_words_ = record_words(layout.record_values)
     words, is_valid = look_up(stencil, place, records, layout.record_values, tests.min_cosine,
                               words=record_words_)
-    length, history = layout.unpack(words)
+    lengths, history = layout.unpack(words)
     omegas = weights_of(layout, chosen)
     e, sparse = [], []
     for signal, old, omega in zip(signals, history, omegas, strict=True):
@@ -156,7 +157,7 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
                                     dr.select(is_valid, old.samples, 0)))
     energies = [dr.minimum(dr.square(s.luminance), MAX_ENERGY) for s in e]
     variances = [old.variance for old in history]
-    length = dr.select(is_valid, dr.minimum(length + 1, max_history_length), 1)
+    lengths = [dr.select(is_valid, dr.minimum(n + 1, max_history_length), 1) for n in lengths]
     valid_inverse_depth = dr.select(is_valid, plane.inverse_depth, _NO_HISTORY)
     others = []
     for f, shadow in enumerate(shadows):
@@ -171,7 +172,7 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
         others.append(ShadowInnovation(
             other, dr.select(moves, visibility, history[s].signal.luminance),
             dr.select(moves, variance, variances[s]), dr.square(other) - energies[s]))
-    return Innovations(e, energies, length, variances, valid_inverse_depth, others,
+    return Innovations(e, energies, lengths, variances, valid_inverse_depth, others,
                        [footprint_falloff(shadow.penumbra, falloff_scale, MIN_SHARE)
                         for shadow in shadows], sparse,
                        None if lobes is None else turned(lobes, surface.normal, place))

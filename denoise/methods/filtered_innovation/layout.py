@@ -38,9 +38,10 @@ class NoisySignal(NamedTuple):
 
 
 class History(NamedTuple):
-    """What a record holds: history length, frames, and the signals."""
+    """What a record holds: lengths of histories in frames, see `SignalLayout.length`, and the
+    signals."""
 
-    length: Float
+    lengths: list[Float]
     signals: list[NoisySignal]
 
 
@@ -176,22 +177,31 @@ class SignalLayout:
     def pack(self, history: History) -> list[Any]:
         """What a record holds, in its order (a structure)."""
         rest = len(self.kinds) - self._looked_up
-        return [history.signals[rest:], history.length, *history.signals[:rest]]
+        return [history.signals[rest:], *history.lengths, *history.signals[:rest]]
 
     def unpack(self, values: Iterable[Float]) -> History:
         """The history, of the values of a record."""
         planes, rest = iter(values), len(self.kinds) - self._looked_up
         first = [self._noisy_signal(s, planes) for s in range(rest, len(self.kinds))]
-        length = next(planes)
-        return History(length, [*(self._noisy_signal(s, planes) for s in range(rest)), *first])
+        lengths = [next(planes) for _ in range(self._lengths)]
+        return History(lengths, [*(self._noisy_signal(s, planes) for s in range(rest)), *first])
 
     @property
     def record_values(self) -> int:
-        return 1 + self.output_planes(range(len(self.kinds)))
+        return self._lengths + self.output_planes(range(len(self.kinds)))
 
     def record_place(self, s: int) -> int:
         """Where a visibility that shadow rays tell of is among the values of a record."""
         return 3 * (self.group(s) or 0)
+
+    def length(self, s: int) -> int:
+        """Which of the lengths is that of a signal's history, if it is not sparse: diffuse light
+        has its own, the sharp signals share one where records would not fit a cache line else."""
+        return s if self.groups else min(s, 1)
+
+    @property
+    def _lengths(self) -> int:
+        return self.length(len(self.kinds) - self.groups - 1) + 1
 
     @property
     def _looked_up(self) -> int:

@@ -14,6 +14,7 @@ from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import mapped
 
+from .change import certainty, coin_variance, lengths_left
 from .innovation import Innovations, ShadowInnovation, weights_of
 from .layout import NoisySignal, SignalLayout, Smoothed
 from .noise import NO_SAMPLE, PRIOR_VARIANCE, spatial_variances
@@ -22,12 +23,11 @@ from .output import FEWEST_SAMPLES, fade_out
 MIN_NOISE = 0.25               # share of the innovation's energy that is at least noise of d
 _FILLED = 0.5                  # samples that what was filtered counts for
 _UNKNOWN = 0.5                 # visibility that nothing is known of
-_LEAST_NOISE = 0.01            # variance of a sample of visibility
 _MOST_SAMPLES = 64.0
 LEAST_MEAN = -0.5              # of h + S[e] / S[omega]; lone rays with a small omega say anything
 _LEAST_OMEGA = 0.1             # that a lone sample is divided by
 _OTHER_IMAGE = 0.5             # lobes by which a mirror direction may turn
-_MIN_ENERGY = 1e-20            # square of a luminance that is taken for 0
+_RENEWED = 2.0                 # n below which the noise is estimated anew
 
 
 class Gains(NamedTuple):
@@ -36,6 +36,7 @@ class Gains(NamedTuple):
     Attributes:
         alphas: of each signal. min_gain: g. noise_threshold: k. sharp_min_gain: g'.
         change_alpha: r. fade_frames: until the last filter has faded.
+        changes: p of each signal, of `change.py`.
     """
 
     alphas: list[Float]
@@ -44,13 +45,16 @@ class Gains(NamedTuple):
     sharp_min_gain: Float
     change_alpha: Float
     fade_frames: Float
+    changes: list[Float]
 
 
 class Merged(NamedTuple):
-    """The new history of each signal, and `fade_out`, of sparse ones by their samples."""
+    """The new history of each signal, its lengths, and `fade_out` of each signal, of sparse ones by
+    their samples."""
 
     signals: list[NoisySignal]
-    fade: Float
+    lengths: list[Float]
+    fades: list[Float]
     sparse_fades: list[Float]
 
 
@@ -59,61 +63,85 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
     """The new history, and how the last filter fades out with it."""
     if innovations.shadows:
         innovations, smoothed = _choose_history(innovations, innovations.shadows[0], smoothed)
-    is_new = innovations.length < 1.5
+    is_new = innovations.lengths[0] < 1.5
     omegas = weights_of(layout, chosen)
     dense = [s for s, omega in enumerate(omegas) if omega is None]
     first = [_only_sample(y, omega) for y, omega in zip(signals, omegas) if omega is not None]
+    sharp = [smoothed.diffuse, *smoothed.sharp]
+    changes = [_change(sharp[len(dense) + g].luminance, weight, sparse.history)
+               for g, (weight, sparse) in enumerate(zip(smoothed.weights, innovations.sparse))]
+    left = lengths_left(layout, innovations, smoothed, changes, gains.noise_threshold,
+                        gains.changes)
+    lengths = list(innovations.lengths)
+    for s in dense:
+        lengths[layout.length(s)] = dr.minimum(lengths[layout.length(s)], left[s])
+    lengths = [dr.maximum(n, 1) for n in lengths]
+    is_renewed = [n < _RENEWED for n in left]
     turned = innovations.turned
-    is_other = is_new if turned is None else is_new | (turned > _OTHER_IMAGE)
-    spatial = spatial_variances(stencil, [signals[s] for s in dense], is_other, plane, first)
+    if turned is not None:
+        glossy = layout.kinds.index(SignalKind.GLOSSY)
+        is_renewed[glossy] = is_renewed[glossy] | (turned > _OTHER_IMAGE)  # a new mask
+    asks = is_new
+    for renewed in is_renewed:
+        asks = asks | renewed
+    spatial = spatial_variances(stencil, [signals[s] for s in dense], asks, plane, first)
     visible = dict(zip(layout.visibilities, smoothed.visibility_spread, strict=True))
     merged, sparse_fades = [], []
     for s, (kind, signal) in enumerate(zip(layout.kinds, signals, strict=True)):
-        e, wide = innovations.signals[s], [smoothed.diffuse, *smoothed.sharp][s]
+        e, wide = innovations.signals[s], sharp[s]
         variance, omega, samples = innovations.variances[s], omegas[s], None
         alpha, gain = gains.alphas[s], gains.sharp_min_gain
         if kind is SignalKind.DIFFUSE:
-            gain = dr.maximum(_certainty(smoothed.diffuse_spread, wide, gains), gains.min_gain)
+            certain = certainty(smoothed.diffuse_spread, dr.square(wide.luminance),
+                                gains.noise_threshold)
+            gain = dr.maximum(certain, gains.min_gain)
         elif kind is SignalKind.VISIBILITY:
-            certain = _certainty(visible[s], wide, gains)
+            certain = certainty(visible[s], dr.square(wide.luminance), gains.noise_threshold)
             gain = dr.maximum(certain, gains.sharp_min_gain)
             alpha = dr.maximum(alpha, gains.change_alpha * certain)
         elif turned is not None:  # glossy light
             alpha = dr.maximum(alpha, turned)
         if omega is None:
-            a = dr.maximum(1 / innovations.length, alpha)
+            a = dr.maximum(1 / lengths[layout.length(s)], alpha)
             merged_signal = mapped(_merged(dr.maximum(gain, a), a), signal, e, wide)
             energy = smoothed.energies[s]
             noise = dr.maximum(energy - variance, energy * MIN_NOISE)
-            if kind is SignalKind.GLOSSY:
-                noise = dr.select(is_other, spatial[s], noise)
+            most = energy
         else:
             g = s - len(dense)
-            old = innovations.sparse[g]
-            low = dr.fma(_norm(smoothed.weights[g]), wide.luminance, old.history)
-            change = dr.clip(low, LEAST_MEAN, LARGEST_VISIBILITY) - old.history
-            a = dr.minimum(dr.maximum(1 / (old.samples + old.weight + _FILLED), alpha), 1)
+            old, change = innovations.sparse[g], changes[g]
+            known = dr.minimum(old.samples, left[s])
+            filled = _FILLED * dr.minimum(left[s], 1)
+            a = dr.minimum(dr.maximum(1 / (known + old.weight + filled), alpha), 1)
+            gain = dr.maximum(gain, 1 - known)  # what was filtered knows less than S
             v = dr.fma(gain, change, old.history)
             v = dr.fma(a, dr.fma(-old.weight, change, e.luminance), v)
             alone = dr.select(first[g] >= 0, first[g], _UNKNOWN)
             merged_signal = Signal(None, dr.select(is_new, alone, v), None)
-            mean = dr.clip(old.history + change, 0, 1)
-            noise = dr.maximum(mean * (1 - mean), _LEAST_NOISE)
-            samples = dr.minimum(old.samples + omega, _MOST_SAMPLES)
+            noise = most = coin_variance(old.history + change)
+            samples = dr.minimum(known + omega, _MOST_SAMPLES)
             a = dr.select(is_new, dr.select(omega > 0, type(a)(1), 0), dr.minimum(a * omega, 1))
             sparse_fades.append(fade_out(samples, gains.fade_frames))
+        noise = dr.select(is_renewed[s], dr.minimum(spatial[s], most), noise)
         noise = dr.select(is_new, spatial[s], noise)
         variance = dr.fma(dr.square(1 - a), variance, dr.square(a) * noise)
         if samples is not None:
             variance = dr.select(samples > FEWEST_SAMPLES, variance, PRIOR_VARIANCE)
         merged.append(NoisySignal(merged_signal, variance, samples))
-    return Merged(merged, fade_out(innovations.length, gains.fade_frames), sparse_fades)
+    fades = [fade_out(lengths[layout.length(s)], gains.fade_frames) for s in dense]
+    return Merged(merged, lengths, fades, sparse_fades)
 
 
 def _only_sample(signal: Signal, omega: Float) -> Float:
     """V of a sparse signal from one sample, `NO_SAMPLE` where there is none."""
     v = dr.minimum(signal.luminance / dr.maximum(omega, _LEAST_OMEGA), LARGEST_VISIBILITY)
     return dr.select(omega > 0, v, NO_SAMPLE)
+
+
+def _change(wide: Float, weight: Float, history: Float) -> Float:
+    """S[e] / S[omega], such that the mean of visibility stays within its bounds."""
+    low = dr.fma(_norm(weight), wide, history)
+    return dr.clip(low, LEAST_MEAN, LARGEST_VISIBILITY) - history
 
 
 def _norm(weight: Float) -> Float:
@@ -142,8 +170,3 @@ def _choose_history(innovations: Innovations, shadow: ShadowInnovation,
                                  variances=[*innovations.variances[:-1], variance]),
             smoothed._replace(sharp=[*smoothed.sharp[:-1], wide],
                               energies=[*smoothed.energies[:-1], energy]))
-
-
-def _certainty(spread: Float, wide: Signal, gains: Gains) -> Float:
-    """c = 1 - k Q / l(S[e])^2. (A ratio's norm is in both.)"""
-    return 1 - gains.noise_threshold * spread / dr.maximum(dr.square(wide.luminance), _MIN_ENERGY)

@@ -4,7 +4,8 @@ A frame's light is split into signals that have noise of their own kind (`inputs
 visibility of lights, what glossy lobes reflect, and the rest, demodulated. The innovation of a
 signal is the frame's value minus its reprojected history. Smoothed widely over the surface it says
 how the light has changed, with little noise: history takes a share of it, the gain, and alpha of
-what is left (`merging.py`). A last filter is for the eye alone and is not fed back (`output.py`).
+what is left (`merging.py`); where it is large against the noise, history is cut short
+(`change.py`). A last filter is for the eye alone and is not fed back (`output.py`).
 All signals go through one pass a level, so that geometry is weighed once.
 
 Parameters were found by measurement: see `studies/tune.py`.
@@ -65,6 +66,11 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         sharp_min_gain: as `min_gain`, of visibility and glossy light [1, 1e-6 to 1].
         change_alpha: weight of the current frame in the high frequencies of visibility where a
             change of the low ones is certain [1, 0 to 1].
+        light_change: how soon a change forgets the history of diffuse light: the squared change
+            counts so many times against the noise of a frame, see `change.py`; 0: not at all
+            [1, 0 to 1e6].
+        glossy_change: the same of glossy light [1, 0 to 1e6].
+        visibility_change: the same of visibility [1, 0 to 1e6].
         innovation_levels: levels of the innovation's smoothing, of diffuse light [1, 2 to 8].
         output_levels: levels of the last filter of diffuse light while there is no history; the
             last of them fades out over `fade_frames` [1, 1 to 8].
@@ -104,6 +110,9 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     noise_threshold: float = 4.0
     sharp_min_gain: float = 0.75
     change_alpha: float = 0.6
+    light_change: float = 12.0
+    glossy_change: float = 4.0
+    visibility_change: float = 8.0
     innovation_levels: int = 5
     output_levels: int = 4
     sharp_innovation_levels: int = 3
@@ -131,7 +140,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         for name in ("light_alpha", "visibility_alpha", "min_gain", "sharp_min_gain"):
             check_range(self, name, 1e-6, 1.0)
         check_range(self, "change_alpha", 0.0, 1.0)
-        check_range(self, "noise_threshold", 0.0, 1e6)
+        for name in ("noise_threshold", "light_change", "glossy_change", "visibility_change"):
+            check_range(self, name, 0.0, 1e6)
         check_range(self, "max_history_length", 1.0, 1e6)
         check_range(self, "min_cosine", -1.0, 1.0)
         check_positive(self, "light_sigma", "visibility_sigma", "mirror_sigma", "fade_frames",
@@ -181,7 +191,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
                               self._gains(stencil, layout))
         output = passes.filter_output(merged, innovations, plane, self._sigmas(stencil, layout),
                                       narrower)
-        records = passes.pack(sample, History(innovations.length, merged.signals),
+        records = passes.pack(sample, History(merged.lengths, merged.signals),
                               output if layout.groups else None)
         return light.color(output), replace(state, passes=passes, records=records,
                                             previous=without_images(frame))
@@ -214,11 +224,14 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
 
     def _gains(self, stencil: Stencil, layout: SignalLayout) -> Gains:
         alphas = layout.each(self.light_alpha, self.visibility_alpha)
+        change = {SignalKind.DIFFUSE: self.light_change, SignalKind.GLOSSY: self.glossy_change,
+                  SignalKind.VISIBILITY: self.visibility_change}
         # Without visibility apart, diffuse light has the shadows in it, which are quick.
         min_gain = self.min_gain if SignalKind.VISIBILITY in layout.kinds else 1.0
         return Gains([stencil.opaque(alpha) for alpha in alphas], stencil.opaque(min_gain),
                      stencil.opaque(self.noise_threshold), stencil.opaque(self.sharp_min_gain),
-                     stencil.opaque(self.change_alpha), stencil.opaque(self.fade_frames))
+                     stencil.opaque(self.change_alpha), stencil.opaque(self.fade_frames),
+                     [stencil.opaque(change[kind]) for kind in layout.kinds])
 
     def _sigmas(self, stencil: Stencil, layout: SignalLayout) -> list[Float]:
         """As the exponents of the last filter want them."""

@@ -26,11 +26,11 @@ _NEVER = -1e3                  # log2 of a weight that is 0
 
 
 class OutputFalloff(NamedTuple):
-    """What weakens the taps of the last filter: `fade_out` of its last level, of signals that are
-    not sparse and of each that is, `penumbra.footprint_falloff` of each visibility that shadow
+    """What weakens the taps of the last filter: `fade_out` of its last level, of each signal that
+    is not sparse and of each that is, `penumbra.footprint_falloff` of each visibility that shadow
     rays tell of, and by what sigma of glossy light is divided, of `narrowed`."""
 
-    fade: Float
+    fades: list[Float]
     sparse_fades: list[Float]
     footprints: list[Float]
     narrowed: Float | None
@@ -93,7 +93,7 @@ class _Rule(NamedTuple):
     def of(layout: SignalLayout, s: int, level: int, falloff: OutputFalloff,
            spacing: Float) -> _Rule:
         f, g = layout.follower(s), layout.group(s)
-        fade = falloff.fade if g is None else falloff.sparse_fades[g]
+        fade = falloff.fades[s] if g is None else falloff.sparse_fades[g]
         return _Rule(footprint(None if f is None else falloff.footprints[f], spacing),
                      fade if layout.is_last_level(s, level) else None)
 

@@ -137,7 +137,7 @@ class Passes:
     def filter_output(self, merged: Merged, innovations: Innovations, plane: TangentPlane,
                       sigmas: list[Float], narrower: Float | None) -> list[Signal]:
         """The last filter of each signal; narrower: of `narrowed`."""
-        falloff = OutputFalloff(merged.fade, merged.sparse_fades, innovations.footprint_falloffs,
+        falloff = OutputFalloff(merged.fades, merged.sparse_fades, innovations.footprint_falloffs,
                                 narrower)
         filtered = self._through(self.output, [_counted(noisy) for noisy in merged.signals], plane,
                                  falloff, sigmas)

@@ -1,0 +1,67 @@
+"""After a sudden change history is no worse than none, in small renders."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
+from onespp.denoise.metrics.errors import psnr
+from onespp.denoise.metrics.tonemap import srgb_from_linear
+from onespp.denoise.studies.hard_scenes import run, run_alone
+from onespp.render.tracer.renderer import Renderer
+from onespp.scenes.animation import Animation
+from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
+from onespp.scenes.materials import diffuse
+from onespp.scenes.transforms import look_at, rotate, scale, translate
+
+HEIGHT, WIDTH, EVENT, SPP = 48, 72, 4, 256
+_X, _BLACK = (1, 0, 0), diffuse((0.0, 0.0, 0.0))
+
+
+def _lamp(name, x, emission):
+    return Shape(name, Rectangle(), _BLACK,
+                 translate((x, 2.8, 0.9)) @ rotate(_X, 90) @ scale((0.35, 0.35, 1)), emission)
+
+
+def _scene(*shapes):
+    floor = Shape("floor", Rectangle(), diffuse((0.55, 0.5, 0.45)),
+                  rotate(_X, -90) @ scale((3, 3, 1)))
+    wall = Shape("wall", Rectangle(), diffuse((0.6, 0.25, 0.2)),
+                 translate((0, 1.5, -1.6)) @ scale((3, 1.5, 1)))
+    ball = Shape("ball", Sphere(), diffuse((0.7, 0.65, 0.3)),
+                 translate((-0.9, 0.45, 0.2)) @ scale(0.45))
+    return Scene("small", "", (floor, wall, ball, *shapes),
+                 Camera(look_at((0.4, 1.6, 4.6), (0, 0.7, 0)), fov=38), EVENT + 1, WIDTH, HEIGHT,
+                 max_depth=4)
+
+
+def _switched_off():
+    white = (16.0, 15.0, 13.0)
+    return _scene(_lamp("one", -1.0, lambda f: white if f < EVENT else (0.0, 0.0, 0.0)),
+                  _lamp("other", 1.2, (5.0, 6.0, 9.0)))
+
+
+def _appears():
+    return _scene(_lamp("one", 0.3, (24.0, 22.0, 20.0)), Shape(
+        "new", Sphere(), diffuse((0.2, 0.5, 0.3)), Animation(
+            lambda f: translate((0.5 if f >= EVENT else 50, 0.5, 0.6)) @ scale(0.5))))
+
+
+@pytest.mark.parametrize("make", [_switched_off, _appears])
+def test_the_frame_after_a_change_is_at_most_1_db_behind_single_frames(make):
+    renderer = Renderer(make(), HEIGHT, WIDTH, direct="resampled", sampler="zsobol")
+    frames = [renderer.frame(i, channels=renderer.channels) for i in range(EVENT + 1)]
+    truth = srgb_from_linear(renderer.sample_sum(EVENT, 1, 0, SPP) / SPP)
+
+    def decibels(**settings):
+        method = FilteredInnovation(**settings)
+        images = [images[-1] for images in (
+            run(method, frames, method.init(HEIGHT, WIDTH)),
+            run_alone(method, frames[-1:], method.init(HEIGHT, WIDTH)))]
+        return [psnr(srgb_from_linear(np.maximum(image, 0)), truth) for image in images]
+
+    with_history, alone = decibels()
+    assert with_history > alone - 1
+    late, _ = decibels(light_change=0, visibility_change=0)
+    assert late < alone - 2
