@@ -38,7 +38,8 @@ class NoisySignal(NamedTuple):
 
 
 class History(NamedTuple):
-    """What a record holds: lengths of histories, frames (see `SignalLayout.length`), and the signals."""
+    """What a record holds: lengths of histories, frames (see `SignalLayout.length`), and the
+    signals."""
 
     lengths: list[Float]
     signals: list[NoisySignal]

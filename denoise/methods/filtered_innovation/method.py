@@ -106,7 +106,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     noise_threshold: float = 4.0
     sharp_min_gain: float = 0.75
     change_alpha: float = 0.6
-    light_change: float = 8.0
+    light_change: float = 12.0
     glossy_change: float = 4.0
     visibility_change: float = 8.0
     innovation_levels: int = 5

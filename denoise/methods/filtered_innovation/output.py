@@ -25,8 +25,8 @@ _NEVER = -1e3                  # log2 of a weight that is 0
 
 class OutputFalloff(NamedTuple):
     """What weakens the taps of the last filter: `fade_out` of its last level, of each signal that
-    is not sparse and of each that is, and `penumbra.footprint_falloff` of each visibility that shadow
-    rays tell of."""
+    is not sparse and of each that is, and `penumbra.footprint_falloff` of each visibility that
+    shadow rays tell of."""
 
     fades: list[Float]
     sparse_fades: list[Float]
