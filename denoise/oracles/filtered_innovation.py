@@ -348,27 +348,26 @@ def run(frames: list[Frame], m) -> np.ndarray:
             narrow = narrowness(frame, told, m) if follows else np.zeros(found.shape)
             q = spread(frame, lum(e) ** 2, found, smoothing, m, narrow)
             wide = smooth(frame, e, found, smoothing, m, narrow=narrow)
-            if previous is not None:
-                if follows:
-                    both = np.concatenate([kept[name][0], kept[name][1][..., None]], -1)
-                    both, moves = shadow_history(previous, frame, told, both, m)
-                    moves &= found
-                    there = both[..., :-1]
-                    other = np.where(moves[..., None], d - omega[..., None] * there, e)
-                    levels_ = min(max(5, m.sharp_innovation_levels), m.innovation_levels)
-                    excess = (smooth(frame, other**2 - e**2, found, 1, m, first=2) if sparse else
-                              smooth(frame, other**2 - e**2, found, levels_, m))
-                    excess = excess + 1e-6 if sparse else excess
-                    better = excess[..., 0] < 0
-                    wide = np.where(excess < 0, smooth(frame, other, found, smoothing, m,
-                                                       narrow=narrow), wide)
-                    e = np.where(excess < 0, other, e)
-                    if sparse:  # chosen before the smoothing
-                        wide = smooth(frame, e, found, smoothing, m, narrow=narrow)
-                        q = spread(frame, lum(e) ** 2, found, smoothing, m, narrow)
-                    s2 = np.where(better & moves, both[..., -1], s2)
-                    h = np.where((better & moves)[..., None], there, h)
-                    energy = np.maximum(energy + np.minimum(excess[..., 0], 0), 0)
+            if previous is not None and follows:
+                both = np.concatenate([kept[name][0], kept[name][1][..., None]], -1)
+                both, moves = shadow_history(previous, frame, told, both, m)
+                moves &= found
+                there = both[..., :-1]
+                other = np.where(moves[..., None], d - omega[..., None] * there, e)
+                levels_ = min(max(5, m.sharp_innovation_levels), m.innovation_levels)
+                excess = (smooth(frame, other**2 - e**2, found, 1, m, first=2) if sparse else
+                          smooth(frame, other**2 - e**2, found, levels_, m))
+                excess = excess + 1e-6 if sparse else excess
+                better = excess[..., 0] < 0
+                wide = np.where(excess < 0, smooth(frame, other, found, smoothing, m,
+                                                   narrow=narrow), wide)
+                e = np.where(excess < 0, other, e)
+                if sparse:  # chosen before the smoothing
+                    wide = smooth(frame, e, found, smoothing, m, narrow=narrow)
+                    q = spread(frame, lum(e) ** 2, found, smoothing, m, narrow)
+                s2 = np.where(better & moves, both[..., -1], s2)
+                h = np.where((better & moves)[..., None], there, h)
+                energy = np.maximum(energy + np.minimum(excess[..., 0], 0), 0)
             turn, change = np.zeros(found.shape), wide
             if name == "G" and "roughness" in frame and previous is not None:
                 turn = np.where(found, turn_of(previous, frame), 0)

@@ -21,12 +21,11 @@ and a signal takes the share f of it:
 
     s^2 <- (1 - a)^2 s^2 + a^2 s_0^2,   s_0^2 = max(W[l(e)^2] - s^2, W[l(e)^2] / 4)
 
-with W the first `ENERGY_LEVELS` levels of S, and n no more than a change leaves (`change.py`):
-unlike the variance of d in a window, that of e has no shadow's edge in it that stands still.
-Without history s_0^2 comes from what a small smoothing takes out of l(d): `spatial_variances`.
-
-t tells how far a mirror direction has turned (`reflections.py`); where that is by more than half a
-lobe, s_0^2 of glossy light is as without history.
+with W the first `ENERGY_LEVELS` levels of S: unlike the variance of d in a window, that of e has
+no shadow's edge in it that stands still. Without history s_0^2 comes from what a small smoothing
+takes out of l(d): `spatial_variances`; so it does, if that is less than W, where a change leaves
+little of n (`change.py`), and of glossy light where a mirror direction has turned by more than half
+a lobe (t, `reflections.py`).
 
 Visibility has two histories, where the surface was and where its shadow was: `shadow_motion.py`.
 Where the latter is taken, W is less by as much as its e^2 is, smoothed, and at least 0.
@@ -37,10 +36,11 @@ ratio of sums, S[e] / S[omega], without noise of which light was picked. History
 
     h <- h + f S[e] / S[omega] + a (e - omega S[e] / S[omega]),   a = max(1 / (N + 1/2), ...),
 
-N being the sum of omega over its frames, this one included. The noise of a sample is that of a
-coin, s_0^2 = v (1 - v), v = h + S[e] / S[omega], and which history is the right one is told before
-the smoothing by excess over fewer pixels (`passes.py`). In the last filter a pixel counts by
-what its history holds, min(N, 1), and one that has had no ray yet keeps what the filter found.
+N being the sum of omega over its frames, this one included; f is at least 1 less N without it. The
+noise of a sample is that of a coin, s_0^2 = v (1 - v), v = h + S[e] / S[omega], and which history
+is the right one is told before the smoothing by excess over fewer pixels (`passes.py`). In the last
+filter a pixel counts by what its history holds, min(N, 1), and one that has had no ray yet keeps
+what the filter found.
 
 A smoothing is a-trous levels of 3x3 taps, h = {1/4, 1/2, 1/4}^2, 2^i pixels apart. The last filter
 of h compares luminance too,
@@ -108,8 +108,8 @@ class Innovations(NamedTuple):
 
     Attributes:
         signals: e of each signal, 0 without history. energies: l(e)^2 of each.
-        lengths: n, as `layout.length` says, 1 without history. variances: s^2 of each signal's
-            history.
+        lengths: n, see `SignalLayout.length`, 1 without history.
+        variances: s^2 of each signal's history.
         valid_inverse_depth: 1/z, far away without history.
         shadows: of the other history of each visibility that has one. footprint_falloffs: of
             `penumbra.py`, of each of those. sparse: of each sparse signal. turned: t of

@@ -281,7 +281,8 @@ def test_five_frames_are_one_recording_and_parameters_compile_nothing():
     frames = split(16, 20, 5)
     run(FilteredInnovation(), frames)
     other = FilteredInnovation(light_alpha=0.1, visibility_sigma=3.0, fade_frames=3.0, penumbra=2.0,
-                               sigma_plane=0.02, max_history_length=9.0, plane_tolerance=0.03)
+                               sigma_plane=0.02, max_history_length=9.0, plane_tolerance=0.03,
+                               light_change=3.0, glossy_change=2.0, visibility_change=1.0)
     assert compiled(lambda: run(other, frames)) == 0
     _, state = run(FilteredInnovation(), frames)
     passes = state.passes

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -55,7 +57,7 @@ def test_the_frame_after_a_change_is_at_most_1_db_behind_single_frames(make):
     truth = srgb_from_linear(renderer.sample_sum(EVENT, 1, 0, SPP) / SPP)
 
     def decibels(**settings):
-        method = FilteredInnovation(**settings)
+        method: Any = FilteredInnovation(**settings)
         images = [images[-1] for images in (
             run(method, frames, method.init(HEIGHT, WIDTH)),
             run_alone(method, frames[-1:], method.init(HEIGHT, WIDTH)))]

@@ -58,7 +58,8 @@ def test_it_is_the_formula_in_float64(height, width, levels, sharp_levels, group
         sharp_output_levels=2, follow_shadows=shadows)
     image, _ = run(method, frames)
     expected = innovation_oracle.run(frames, method)
-    # Two histories that are as good as each other are told apart by a rounding.
+    # Which of two histories as good as each other is taken, and whether n is below 2, is decided by
+    # a rounding at single pixels.
     assert np.isclose(image, expected, rtol=2e-3, atol=1e-4).mean() > 0.99
     np.testing.assert_allclose(image, expected, atol=2e-2)
 
