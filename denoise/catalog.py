@@ -65,8 +65,8 @@ class Method(Protocol[State]):
         """State before the first frame of a sequence of this size."""
         ...
 
-    def __call__(self, frame: Frame, state: State) -> tuple[np.ndarray, State]:
-        """(h, w, 3) float32 denoised radiance, and the state for the next frame."""
+    def __call__(self, frame: Frame, state: State | None) -> tuple[np.ndarray, State]:
+        """(h, w, 3) float32 denoised radiance, and the state for the next frame; None begins."""
         ...
 
 
@@ -216,3 +216,10 @@ PEERS: Mapping[str, Peer] = MappingProxyType({
     "optix-temporal": Peer(partial(Optix, temporal=True), _has_cuda,
                            "NVIDIA's OptiX denoiser with its last result."),
 })
+
+
+def described() -> dict[str, str]:
+    """Name -> what it is, in a line, of every method and peer."""
+    about = {name: (method.__doc__ or "").splitlines()[0] for name, method in METHODS.items()}
+    return about | {name: peer.about + ("" if peer.available() else " Not available here.")
+                    for name, peer in PEERS.items()}

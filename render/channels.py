@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from enum import Enum
 from types import MappingProxyType
 
+from .errors import InputError
+
 
 class Stored(Enum):
     """The type in the file. In memory all is float32, but for object IDs, which are int32."""
@@ -186,3 +188,26 @@ TRAINING = tuple(name for name in OFFERED if name not in (
 """What methods and training read, without what follows from it (`render/derived.py`)."""
 REFERENCE = ("color", "half", "quarter0", "quarter1")
 """What the file of a reference has."""
+
+
+def asked_channels(text: str | None) -> tuple[tuple[str, ...] | None, tuple[str, ...]]:
+    """The channels that `--channels` asks for, None for the default ones, and those to add.
+
+    Raises:
+        InputError: a name that is not in `OFFERED`, or none.
+
+    Example:
+        >>> asked_channels("id,color"), asked_channels("+gradient")
+        ((('color', 'id'), ()), (None, ('replay', 'replay_before')))
+    """
+    if text is None or text == "training":
+        return None, ()
+    added = text.startswith("+")
+    names = [name.strip() for name in text[added:].split(",") if name.strip()]
+    names = [n for name in names for n in (REPLAY if name == "gradient" else (name,))]
+    unknown = [name for name in names if name not in OFFERED]
+    if unknown or not names:
+        raise InputError(f"--channels names {unknown[0] if unknown else 'nothing'}: "
+                         f"use some of {', '.join(OFFERED)}")
+    chosen = tuple(name for name in OFFERED if name in names)
+    return (None, chosen) if added else (chosen, ())

@@ -20,6 +20,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ROOMS = (
     "onespp.__main__", "onespp.cli", "onespp.denoise.cli", "onespp.render.cli",
+    "onespp", "onespp.api",
     "onespp.denoise.report", "onespp.denoise.bench", "onespp.denoise.studies",
     "onespp.denoise.run", "onespp.denoise.score",
     "onespp.denoise.catalog", "onespp.denoise.peers",
@@ -36,7 +37,6 @@ ROOMS = (
     "onespp.render.errors",
     "onespp.scenes.catalog", "onespp.scenes.generated", "onespp.scenes.hard", "onespp.scenes.room",
     "onespp.scenes",
-    "onespp",
 )
 MOST_FILES = 12
 ONLY_IN = {  # package -> rooms that may import it

@@ -6,9 +6,7 @@ from pathlib import Path
 
 import click
 
-from onespp.denoise.score.scorecard import INPUT
-from onespp.render.cli.terminal import command_line, progress
-from onespp.render.files.lock import writing
+from onespp.api import scoring as api
 from onespp.render.files.sequence import FrameSequence
 
 from .options import json_option, show_or_print
@@ -35,18 +33,10 @@ def score(folder: Path, methods: tuple[str, ...], json_to: str | None, pictures:
 def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = None,
              pictures: bool = True, by_cause: bool = False, seeds: tuple[Path, ...] = ()) -> None:
     """Do what the options of `score` ask."""
-    from onespp.denoise.report.contact_sheets import draw_pictures
     from onespp.denoise.report.terminal import print_classes, print_scores, print_splits
-    from onespp.denoise.score.sequence import score as score_sequence
 
-    sequence = FrameSequence.open(folder)
-    others = [FrameSequence.open(other) for other in seeds]
-    with writing(folder, "score"), progress() as report:
-        scores = score_sequence(sequence, list(methods) or None, report, others, command_line())
-        if pictures:  # after the scores, which are on disk whatever happens here
-            trouble = draw_pictures(sequence, scores, [m for m in methods if m != INPUT] or None,
-                                    report)
-            scores = scores.model_copy(update={"notes": [*scores.notes, *trouble]})
+    scores = api.score(FrameSequence.open(folder), methods, pictures=pictures,
+                       seeds=[FrameSequence.open(other) for other in seeds])
 
     def show() -> None:
         print_scores(scores)
