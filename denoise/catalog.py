@@ -54,8 +54,8 @@ class Method(Protocol[State]):
 
     Attributes:
         needs: channels that a frame must have. A method may also have `uses`: channels that it
-            takes where a frame has them, beside albedo and emission; and `renamed`: former name
-            of a parameter -> its name.
+            takes where a frame has them, beside albedo, emission and motion; and `renamed`: former
+            name of a parameter -> its name.
     """
 
     @property
@@ -152,7 +152,7 @@ def _warn(text: str) -> None:
 
 def channels_read(method: Method, there: Iterable[str]) -> tuple[str, ...]:
     """Channels that a method reads of a frame that has those in `there`, what it needs first."""
-    optional = {*TEXTURE, *getattr(method, "uses", ())}
+    optional = {*TEXTURE, "motion", *getattr(method, "uses", ())}
     return tuple(dict.fromkeys((*method.needs, *(c for c in there if c in optional))))
 
 

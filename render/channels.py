@@ -36,6 +36,7 @@ class Group(Enum):
     GROUPED = "direct light by groups of lights, of scenes that have several"
     GLOSS = "reflections, of scenes that have glossy surfaces"
     REPLAY = "samples of the last frame, shaded again"
+    MOTION = "of imports alone, whose motion no matrices tell"
     TRUTH = "of references alone"
 
 
@@ -151,6 +152,9 @@ _ROWS = (
     Channel("replay_before", Group.REPLAY, ("before.direct", "before.indirect"), FLOAT,
             Display.UNIT, -1.0,
             "luminance that the same samples had in that frame; -1: no sample"),
+    Channel("motion", Group.MOTION, ("motion.X", "motion.Y"), EXACT, Display.RANGE, 0.0,
+            "from a pixel's centre to where its surface was on the screen of the frame before, "
+            "pixels, x to the right and y down; not finite: unknown"),
     Channel("variance", Group.TRUTH, _rgb("variance"), EXACT, Display.LIGHT, 0.0,
             "variance of the mean that `color` holds, radiance^2 (older references only)"),
     Channel("half", Group.TRUTH, _rgb("half"), HALF, Display.LIGHT, 0.0,
@@ -181,8 +185,8 @@ RADIANCE, SPLIT, SHADOW, GROUPED, GLOSS, REPLAY = (channels_of(group) for group 
 UNSHADOWED = tuple(name for name in GROUPED if name.startswith("unshadowed"))
 FRAME = channels_of(Group.RADIANCE, Group.GUIDES)
 """What can be said of every scene."""
-OFFERED = channels_of(*(group for group in Group if group is not Group.TRUTH))
-"""What a frame can carry."""
+OFFERED = channels_of(*(group for group in Group if group not in (Group.TRUTH, Group.MOTION)))
+"""What a rendered frame can carry."""
 TRAINING = tuple(name for name in OFFERED if name not in (
     "color", "position", "hit_distance", "hit_id", *REPLAY))
 """What methods and training read, without what follows from it (`render/derived.py`)."""

@@ -60,7 +60,7 @@ class TemporalOidnSplit:
         albedo = _albedo(frame)
         for signal, history in zip((visibility, glossy, (rest - glossy) / albedo),
                                    state.histories):
-            guides = {name: frame[name] for name in GUIDES}
+            guides = {name: frame[name] for name in (*GUIDES, "motion") if name in frame}
             image, after = self.temporal(replace(frame, images={**guides, "color": signal}),
                                          history)
             smooth.append(image)

@@ -16,7 +16,7 @@ from onespp.api import caller, denoising, rendering, scoring
 from onespp.api.caller import Line
 from onespp.denoise.catalog import METHODS, PEERS, build, parameters
 from onespp.denoise.methods.outliers import RemoveOutliers
-from onespp.render import frame
+from onespp.render import frame as frame_module
 from onespp.scenes.box import box
 
 HEAVY = ("numpy", "click", "mitsuba", "drjit", "pydantic", "rich", "PIL", "matplotlib")
@@ -74,7 +74,7 @@ def test_every_public_name_is_there_and_documented():
         _ = onespp.rendr  # type: ignore[attr-defined]
 
 
-EXAMPLES = (rendering, scoring, caller)
+EXAMPLES = (rendering, denoising, scoring, caller, frame_module)
 
 
 @pytest.mark.parametrize("module", EXAMPLES, ids=lambda m: m.__name__)
@@ -86,7 +86,7 @@ PUBLIC = [f for m in (rendering, denoising, scoring) for name, f in vars(m).item
           if name in onespp.__all__ and f.__module__ == m.__name__]
 
 
-@pytest.mark.parametrize("function", PUBLIC, ids=lambda f: f.__name__)
+@pytest.mark.parametrize("function", [*PUBLIC, onespp.Frame.from_arrays], ids=lambda f: f.__name__)
 def test_every_function_has_an_example(function: Callable):
     if function is not scoring.Report:
         assert any("onespp" in test.source or "Frame" in test.source
@@ -218,7 +218,7 @@ def test_progress_is_one_line_that_grows_no_longer():
         line(done, 4, "render", "(12 ms)" if done == 3 else "")
     line.end()
     assert shown == ["\rrender: 1 of 4", "\rrender: 3 of 4 (12 ms), 0 s left",
-                     "\r" + "render: 4 of 4".ljust(34), "\n"]
+                     "\r" + "render: 4 of 4".ljust(32), "\n"]
 
 
 def test_nothing_is_printed_where_nobody_looks():
