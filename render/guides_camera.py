@@ -84,7 +84,7 @@ def _fitted(planes: np.ndarray, normals: np.ndarray, width: int) -> tuple[np.nda
         return np.eye(3), _focal(USUAL_ANGLE, width)
 
     def fit(angle: float) -> tuple[float, float, np.ndarray]:
-        """What it leaves, and a little for an unusual angle: that decides where nothing else can."""
+        """What it leaves, and a little for an unusual angle, for where nothing else decides."""
         rotation, left = _rotation(planes, normals, _focal(angle, width))
         return left + _UNUSUAL * abs(np.log(angle / USUAL_ANGLE)), angle, rotation
 

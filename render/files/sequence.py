@@ -23,7 +23,7 @@ import contextlib
 import io
 import re
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -152,6 +152,10 @@ class FrameSequence:
     def size(self) -> tuple[int, int]:
         """(height, width)."""
         return self.manifest.height, self.manifest.width
+
+    def __iter__(self) -> Iterator[Frame]:
+        """The frames that are there, in order, with all channels; one is read at a time."""
+        return (self.read_frame(i) for i in self.frames if self.has_frame(i))
 
     def has_frame(self, i: int) -> bool:
         return self._path("frames", i).exists() and self._path("frames", i, "json").exists()
