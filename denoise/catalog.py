@@ -157,7 +157,11 @@ def channels_read(method: Method, there: Iterable[str]) -> tuple[str, ...]:
 
 
 def parameters(method: Any) -> dict[str, bool | int | float | str]:
-    """Parameter name -> value, those of a method's parts included."""
+    """Parameter name -> value, those of a method's parts included; of an object that is no
+    dataclass its plain attributes."""
+    if not is_dataclass(method):
+        return {key: value for key, value in getattr(method, "__dict__", {}).items()
+                if isinstance(value, bool | int | float | str) and not key.startswith("_")}
     found: dict[str, bool | int | float | str] = {}
     for f in fields(method):
         value = getattr(method, f.name)

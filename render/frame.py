@@ -20,6 +20,7 @@ import numpy as np
 from .channels import CHANNELS
 from .errors import InputError
 from .guides_camera import camera_of_guides
+from .show.html import frame_html
 
 LARGEST_ID = 1 << 16
 """Of objects without matrices, each of which gets one."""
@@ -136,6 +137,10 @@ class Frame:
     @property
     def width(self) -> int:
         return next(iter(self.images.values())).shape[1]
+
+    def _repr_html_(self) -> str:
+        """Its colour and all channels, for a notebook."""
+        return frame_html(self.index, self.images)
 
     def __contains__(self, channel: str) -> bool:
         return channel in self.images

@@ -33,7 +33,7 @@ ROOMS = (
     "onespp.render.mitsuba", "onespp.render.games202",
     "onespp.render", "onespp.render.files", "onespp.render.host",
     "onespp.render.derived", "onespp.render.frame", "onespp.render.guides_camera",
-    "onespp.render.channels",
+    "onespp.render.show", "onespp.render.channels",
     "onespp.render.progress",
     "onespp.render.errors",
     "onespp.scenes.catalog", "onespp.scenes.generated", "onespp.scenes.hard", "onespp.scenes.room",

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from onespp.render.srgb import srgb_from_linear
+from onespp.render.show.srgb import srgb_from_linear
 
 TONE_MAP = "clipped sRGB"
 

@@ -34,7 +34,8 @@ from onespp.denoise.metrics.table import MEASURES
 from onespp.render.errors import InputError
 from onespp.render.files.json_file import JsonFile, format_json
 
-from .scorecard import MethodScore, Scores
+from .method_score import MethodScore
+from .scorecard import Scores
 
 TIME = Metric("ms", "time", lambda a, b: None, "", "ms", False, ".1f", "milliseconds a frame")
 ROWS: Mapping[str, Metric] = {**MEASURES, TIME.name: TIME}

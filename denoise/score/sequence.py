@@ -20,11 +20,11 @@ from onespp.denoise.metrics.errors import PSNR_CAP
 from onespp.denoise.metrics.estimate import BOUND, Number
 from onespp.denoise.metrics.means import identical, mean_decibels, sequence_number
 from onespp.denoise.metrics.noise_floor import reference_floor, seen_floors
-from onespp.denoise.metrics.table import HEADLINE, MEASURES, METRICS, spread
+from onespp.denoise.metrics.table import HEADLINE, MEASURES, METRICS
 from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
-from onespp.render.files.frame_ranges import format_frames
+from onespp.render.files.frame_ranges import format_frames, spread
 from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.files.times import read_times
 from onespp.render.progress import Progress, silent
@@ -33,8 +33,9 @@ from .bias_variance import check_seeds, split_errors
 from .commands import commands
 from .cost import cost
 from .frame_truth import FrameTruth, read_frame_truth
+from .method_score import INPUT, MethodScore
 from .paired import PairedErrors
-from .scorecard import INPUT, MethodScore, Scores
+from .scorecard import Scores
 from .scorer import MethodScorer
 
 MOST_LOST = 0.01

@@ -61,6 +61,7 @@ def denoise(sequence: FrameSequence, method: str | Method[Any] = "onespp", *,
         if parameters:
             raise InputError(f"{', '.join(parameters)} can be given with a method's name only: set "
                              "parameters of a method of yours when you make it")
+        _check_method(method)
         made = method if outliers is None else WithoutOutliers(method, RemoveOutliers(outliers))
         called = name_of(made) or type(method).__name__
     with caller().progress() as report:
@@ -110,6 +111,16 @@ def methods() -> dict[str, str]:
         True
     """
     return described()
+
+
+def _check_method(method: Any) -> None:
+    for name in ("needs", "init", "__call__"):
+        if not hasattr(method, name) or isinstance(method, type):
+            what = f"the class {method.__name__}" if isinstance(method, type) else (
+                f"a {type(method).__name__} without `{name}`")
+            raise InputError(f"denoise was given {what}: use a name of onespp.methods(), or an "
+                             "object with `needs`, `init(height, width)` and "
+                             "`__call__(frame, state)`")
 
 
 def _as_text(parameters: dict[str, bool | int | float | str]) -> dict[str, str]:

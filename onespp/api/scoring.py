@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -98,11 +99,28 @@ def compare(a: Scores | Path | str, b: Scores | Path | str,
     return comparison(a, b, list(methods or ()) or None, limits)
 
 
+LARGEST_INLINE = 32 << 20
+"""Bytes of a report that a notebook shows inline: it keeps them in its file."""
+
+
 @dataclass(frozen=True)
 class Report:
     """A written report: `path` is its index.html, which opens in any browser."""
 
     path: Path
+
+    def _repr_html_(self) -> str:
+        """The page itself, for a notebook, or where it is if it is large."""
+        size = sum(file.stat().st_size for file in self.path.parent.rglob("*.*"))
+        if size > LARGEST_INLINE:
+            return (f"<div>The report has {size >> 20} MB, too many for a notebook: open "
+                    f"<code>{html.escape(str(self.path))}</code> in a browser, or write it with "
+                    "fewer channels, as <code>channels=[]</code>.</div>")
+        from onespp.denoise.report.html import inlined
+
+        page = html.escape(inlined(self.path))
+        return (f'<iframe srcdoc="{page}" style="width:100%;height:800px;border:0" '
+                'title="report"></iframe>')
 
 
 @public

@@ -159,6 +159,16 @@ def test_a_method_object_denoises_under_its_own_name(sequence):
     assert sequence.read_run("atrous").parameters["levels"] == 2
 
 
+def test_a_plain_class_is_a_method(sequence):
+    half = Half()
+    half.share = 0.5
+    onespp.denoise(sequence, half)
+    np.testing.assert_array_equal(sequence.read_result("Half", 1),
+                                  sequence.read_frame(1)["color"] / 2)
+    assert sequence.read_run("Half").parameters == {"share": 0.5}
+    sequence.remove_results("Half")
+
+
 def test_no_parameter_has_the_name_of_an_argument():
     taken = {"sequence", "method", "name", "outliers"}
     for name in (*METHODS, *PEERS):
@@ -186,6 +196,8 @@ REFUSED = [
     (lambda s: onespp.denoise(s, "svgf", alfa=1), "has no parameter 'alfa'"),
     (lambda s: onespp.denoise(s, "atrous", levels=2.5), "levels is '2.5': use a whole number"),
     (lambda s: onespp.denoise(s, onespp.method("svgf"), alpha=0.1), "method's name only"),
+    (lambda s: onespp.denoise(s, Half), "denoise was given the class Half"),
+    (lambda s: onespp.denoise(s, 3), "denoise was given a int without `needs`"),
     (lambda s: onespp.denoise(s, "asvgf"), "asvgf needs the channels replay and replay_before"),
     (lambda s: onespp.score("folder"), "score takes a sequence"),
     (lambda s: onespp.score(s, ["svfg"]), "svfg"),
