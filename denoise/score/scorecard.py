@@ -8,6 +8,7 @@ beside the declared fields, under their names: `scores.methods["input"]["psnr_sr
 from __future__ import annotations
 
 import csv
+import importlib
 import io
 from pathlib import Path
 from typing import Any
@@ -116,7 +117,7 @@ class Scores(JsonFile):
             InputError: pandas is not installed.
         """
         try:
-            import pandas
+            pandas = importlib.import_module("pandas")  # no dependency of ours
         except ImportError:
             raise InputError("to_pandas() needs pandas, which is not installed: run "
                              "`pip install pandas`, or read scores.csv") from None

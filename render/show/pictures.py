@@ -6,20 +6,20 @@ import numpy as np
 
 from onespp.render.channels import CHANNELS, Display
 
-from .srgb import srgb_from_linear
+from .srgb import bytes_from_linear
 
 _GOLDEN = 0.618034  # of a turn of hue from one object to the next: neighbours differ most
 
 
 def picture(name: str, image: np.ndarray) -> np.ndarray:
-    """(h, w, 3) uint8 of a channel's image; what is not finite is black."""
+    """(h, w, 3) uint8 of a channel's image; what is not a number is black, or 0."""
     display = CHANNELS[name].display
     if display is Display.OBJECT:
         return _objects(image)
-    values = np.nan_to_num(np.asarray(image, np.float32), nan=0.0, posinf=0.0, neginf=0.0)
     if display is Display.LIGHT:
-        shown = srgb_from_linear(values)
-    elif display is Display.AXES:
+        return bytes_from_linear(image)
+    values = np.nan_to_num(np.asarray(image, np.float32), nan=0.0, posinf=0.0, neginf=0.0)
+    if display is Display.AXES:
         shown = (values + 1) / 2
     elif display is Display.RANGE:
         shown = _stretched(values)
