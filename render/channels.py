@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from enum import Enum
 from types import MappingProxyType
 
+from onespp.show.pictures import Display
+
 from .errors import InputError
 
 
@@ -38,16 +40,6 @@ class Group(Enum):
     REPLAY = "samples of the last frame, shaded again"
     MOTION = "of imports alone, whose motion no matrices tell"
     TRUTH = "of references alone"
-
-
-class Display(Enum):
-    """How a picture shows a channel."""
-
-    LIGHT = "tone-mapped, as radiance"
-    AXES = "components of a unit vector, -1 to 1"
-    RANGE = "from its least to its greatest value"
-    UNIT = "0 to 1"
-    OBJECT = "a colour for each object"
 
 
 @dataclass(frozen=True)

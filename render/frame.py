@@ -17,10 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from onespp.show.html import Shown, frame_html
+
 from .channels import CHANNELS
 from .errors import InputError
 from .guides_camera import camera_of_guides
-from .show.html import frame_html
 
 LARGEST_ID = 1 << 16
 """Of objects without matrices, each of which gets one."""
@@ -140,7 +141,9 @@ class Frame:
 
     def _repr_html_(self) -> str:
         """Its colour and all channels, for a notebook."""
-        return frame_html(self.index, self.images)
+        shown = {name: Shown(image, CHANNELS[name].display, CHANNELS[name].about)
+                 for name, image in self.images.items()}
+        return frame_html(self.index, shown)
 
     def __contains__(self, channel: str) -> bool:
         return channel in self.images

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from onespp.render.show.srgb import bytes_from_linear, srgb_from_linear
+from onespp.show.srgb import bytes_from_linear, srgb_from_linear
 
 __all__ = ["TONE_MAP", "bytes_from_linear", "linear_from_srgb", "srgb_from_linear"]
 

@@ -19,7 +19,7 @@ from onespp.denoise.metrics.metric import Metric
 from onespp.denoise.metrics.table import ESTIMATED, HEADLINE, MEASURES
 from onespp.render.errors import InputError
 from onespp.render.files.json_file import JsonFile, format_json, read_json
-from onespp.render.show.html import table_html
+from onespp.show.html import table_html
 
 from .method_score import INPUT, MethodScore
 

@@ -34,8 +34,8 @@ from onespp.render.channels import CHANNELS, MOST_GROUPS, REFERENCE
 from onespp.render.derived import available, sources, with_derived
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
-from onespp.render.show.html import WIDEST, strip_html
-from onespp.render.show.pictures import fitted
+from onespp.show.html import WIDEST, strip_html
+from onespp.show.pictures import fitted
 
 from .atomic import read_bytes, write_bytes, write_text
 from .cleaning import remove_files, remove_sequence

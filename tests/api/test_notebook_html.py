@@ -16,10 +16,10 @@ from PIL import Image
 
 import onespp
 from onespp.api import scoring
-from onespp.render.channels import CHANNELS, Display
-from onespp.render.show.html import strip_html, table_html
-from onespp.render.show.pictures import fitted, picture
-from onespp.render.show.png import png
+from onespp.render.channels import CHANNELS
+from onespp.show.html import strip_html, table_html
+from onespp.show.pictures import Display, fitted, picture
+from onespp.show.png import png
 from tests.support.browser import chromium
 from tests.support.frames import make_frame
 
@@ -93,7 +93,7 @@ def test_a_frame_shows_its_colour_and_every_channel(sequence):
     shown = Balanced(frame._repr_html_())
     assert len(shown.images) == 1 + len(frame.images)
     assert set(frame.images) <= set(shown.texts)
-    np.testing.assert_array_equal(decoded(shown.images[0]), picture("color", frame["color"]))
+    np.testing.assert_array_equal(decoded(shown.images[0]), picture(frame["color"]))
 
 
 def test_large_frames_are_shown_small():
@@ -111,16 +111,15 @@ def test_every_channel_has_a_picture():
         image = image.astype(np.int32 if channel.is_id else np.float32)
         if not channel.is_id:
             image[0, 0] = np.nan
-        shown = picture(name, image)
+        shown = picture(image, channel.display)
         assert (shown.shape, shown.dtype) == ((12, 16, 3), np.uint8), name
         assert len(np.unique(shown)) > 1, name
 
 
 def test_display_values_are_those_of_the_metrics():
     linear = np.array([[[0.25, 0.5, 2.0], [np.nan, -1.0, np.inf]]], np.float32)
-    np.testing.assert_array_equal(picture("color", linear), [[[137, 188, 255], [0, 0, 255]]])
-    assert CHANNELS["normal"].display is Display.AXES
-    np.testing.assert_array_equal(picture("normal", np.tile([0.0, 1.0, -1.0], (1, 1, 1)))[0, 0],
+    np.testing.assert_array_equal(picture(linear), [[[137, 188, 255], [0, 0, 255]]])
+    np.testing.assert_array_equal(picture(np.tile([0.0, 1.0, -1.0], (1, 1, 1)), Display.AXES)[0, 0],
                                   [128, 255, 0])
 
 
@@ -129,7 +128,7 @@ def test_a_sequence_shows_input_results_and_reference(sequence, scores):
     assert [text for text in shown.texts if text in ("input", "atrous", "reference")] == [
         "input", "atrous", "reference"]
     np.testing.assert_array_equal(decoded(shown.images[1]),
-                                  picture("color", sequence.read_result("atrous", 0)))
+                                  picture(sequence.read_result("atrous", 0)))
 
 
 def test_the_slider_chooses_the_frame(opened, sequence):
@@ -141,7 +140,7 @@ def test_the_slider_chooses_the_frame(opened, sequence):
                                   sequence.read_reference(2).color)):
         image = page.locator("img").nth(i)
         np.testing.assert_array_equal(decoded(image.get_attribute("src")),
-                                      picture("color", expected))
+                                      picture(expected))
         assert image.evaluate("image => image.naturalWidth") == 24
 
 
@@ -192,6 +191,7 @@ def test_a_report_is_the_page_itself(opened, sequence, scores):
     inner = page.frame_locator("iframe")
     inner.locator('#stage[data-ready="true"]').wait_for(timeout=120_000, state="attached")
     assert inner.locator("h1").inner_text() == "box"
+    assert [inner.locator(f"#trouble-{side}").inner_text() for side in "ab"] == ["", ""]
 
 
 def test_a_report_that_is_too_large_says_where_it_is(sequence, monkeypatch):

@@ -9,26 +9,33 @@ import html
 import json
 import uuid
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from onespp.render.channels import CHANNELS
-
-from .pictures import fitted, picture
+from .pictures import Display, fitted, picture
 from .png import data_url
 
 WIDEST, SMALL = 480, 120  # pixels of a picture, and of one among many
 _DIM = "color:gray;font-size:90%"
 
 
-def frame_html(index: int, images: Mapping[str, np.ndarray]) -> str:
+class Shown(NamedTuple):
+    """An image, what its values are, and its meaning in a line."""
+
+    image: np.ndarray
+    display: Display
+    about: str
+
+
+def frame_html(index: int, images: Mapping[str, Shown]) -> str:
     """The colour of a frame, and below it all channels with their names and meanings."""
-    height, width = next(iter(images.values())).shape[:2]
+    height, width = next(iter(images.values())).image.shape[:2]
     large = _shown("color", images["color"], WIDEST) if "color" in images else ""
     small = "".join(
-        f'<figure style="margin:0" title="{html.escape(CHANNELS[name].about)}">'
-        f'{_shown(name, image, SMALL)}<figcaption style="{_DIM}">{name}</figcaption></figure>'
-        for name, image in images.items())
+        f'<figure style="margin:0" title="{html.escape(shown.about)}">'
+        f'{_shown(name, shown, SMALL)}<figcaption style="{_DIM}">{name}</figcaption></figure>'
+        for name, shown in images.items())
     return (f"<div><div><b>frame {index}</b> <span style='{_DIM}'>{width}x{height}, "
             f"{len(images)} channels</span></div>{large}"
             f'<div style="display:flex;flex-wrap:wrap;gap:6px;margin-top:6px">{small}</div></div>')
@@ -43,7 +50,7 @@ def strip_html(title: str, frames: Sequence[int], rows: Mapping[str, Sequence[np
             At most `WIDEST` pixels wide, see `fitted`.
     """
     name = f"onespp-{uuid.uuid4().hex[:12]}"  # pieces of several sessions meet on one page
-    addresses = {label: ["" if image is None else data_url(picture("color", image))
+    addresses = {label: ["" if image is None else data_url(picture(image))
                          for image in images] for label, images in rows.items()}
     figures = "".join(
         f'<figure style="margin:0"><img alt="" src="{urls[0]}" style="{_image(rows[label])}">'
@@ -86,9 +93,9 @@ def table_html(title: str, rows: Mapping[str, Mapping[str, str]], best: set[tupl
             f"<tbody>{''.join(lines)}</tbody></table>{notes}</div>")
 
 
-def _shown(name: str, image: np.ndarray, widest: int) -> str:
-    small = fitted(image, widest)
-    return (f'<img alt="{name}" src="{data_url(picture(name, small))}" '
+def _shown(name: str, shown: Shown, widest: int) -> str:
+    small = fitted(shown.image, widest)
+    return (f'<img alt="{name}" src="{data_url(picture(small, shown.display))}" '
             f'style="{_style(small.shape[1], widest)}">')
 
 

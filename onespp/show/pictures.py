@@ -1,19 +1,29 @@
-"""What a channel looks like: 8-bit sRGB, by the row of the channel table that it has."""
+"""What an image looks like: 8-bit sRGB, by what its values are."""
 
 from __future__ import annotations
 
+from enum import Enum
+
 import numpy as np
 
-from onespp.render.channels import CHANNELS, Display
-
 from .srgb import bytes_from_linear
+
+
+class Display(Enum):
+    """How a picture shows an image."""
+
+    LIGHT = "tone-mapped, as radiance"
+    AXES = "components of a unit vector, -1 to 1"
+    RANGE = "from its least to its greatest value"
+    UNIT = "0 to 1"
+    OBJECT = "a colour for each object"
+
 
 _GOLDEN = 0.618034  # of a turn of hue from one object to the next: neighbours differ most
 
 
-def picture(name: str, image: np.ndarray) -> np.ndarray:
-    """(h, w, 3) uint8 of a channel's image; what is not a number is black, or 0."""
-    display = CHANNELS[name].display
+def picture(image: np.ndarray, display: Display = Display.LIGHT) -> np.ndarray:
+    """(h, w, 3) uint8 of an (h, w) or (h, w, c) image; what is not a number is black, or 0."""
     if display is Display.OBJECT:
         return _objects(image)
     if display is Display.LIGHT:
