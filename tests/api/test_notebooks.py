@@ -87,3 +87,41 @@ def test_a_kernel_is_told_from_a_terminal(monkeypatch):
         assert caller.in_notebook() is expected
     monkeypatch.delitem(sys.modules, "IPython")
     assert not caller.in_notebook()
+
+
+@pytest.fixture
+def kernel():
+    """`run(code)` gives a cell's printed text and the name of its error; `interrupt()` as the
+    button does."""
+    from jupyter_client.manager import start_new_kernel
+
+    manager, client = start_new_kernel()
+
+    def run(code: str, during=lambda: None) -> tuple[str, str | None]:
+        printed, seen = "", False
+
+        def hook(message) -> None:
+            nonlocal printed, seen
+            if message["msg_type"] == "stream":
+                printed += message["content"]["text"]
+                if not seen and "reference" in printed:
+                    seen = True
+                    during()
+
+        reply = client.execute_interactive(code, timeout=300, output_hook=hook)["content"]
+        return printed, reply.get("ename")
+
+    yield run, manager.interrupt_kernel
+    client.stop_channels()
+    manager.shutdown_kernel(now=True)
+
+
+def test_the_stop_button_leaves_the_kernel_usable(kernel, tmp_path):
+    run, interrupt = kernel
+    render = f"s = onespp.render('box', r'{tmp_path}/s', frames=2, size=(96, 128)"
+    printed, error = run(f"import onespp\n{render}, reference_spp=1 << 20)", interrupt)
+    assert error == "KeyboardInterrupt"
+    assert "reference" in printed
+    printed, error = run(f"{render})\nonespp.denoise(s, 'svgf')\nprint(s.methods())")
+    assert error is None
+    assert "['svgf']" in printed
