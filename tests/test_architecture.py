@@ -53,6 +53,8 @@ NEVER = {  # module -> what it never imports
     r"^onespp\.render\.(files|frame|channels|errors)(\.|$)": r"^(drjit|mitsuba)",
     r"^onespp\.denoise(\.|$)": r"^onespp\.(scenes|render\.(tracer|mitsuba))(\.|$)",
     r"^onespp\.render(\.|$)": r"^onespp\.denoise(\.|$)",
+    # a command parses, calls and prints: images and kernels are below it
+    r"^onespp\.(\w+\.)?cli(\.|$)": r"^(numpy|drjit|mitsuba|onespp\.render\.(tracer|mitsuba))(\.|$)",
     r"^onespp\.scenes(\.|$)": r"^(onespp\.(render|denoise)|drjit|mitsuba)(\.|$)",
 }
 
@@ -139,6 +141,9 @@ def test_the_rules_hold():
     ("onespp.denoise.run.sequence", "from onespp.render.tracer import path", "imports"),
     ("onespp.denoise.methods.svgf", "import mitsuba as mi", "imports mitsuba"),
     ("onespp.scenes.box", "import onespp.render.frame", "imports onespp.render"),
+    ("onespp.cli.hard", "import numpy as np", "imports numpy"),
+    ("onespp.show.png", "from onespp.render import channels", "up from"),
+    ("onespp.api.caller", "import onespp.cli", "up from"),
 ])
 def test_a_broken_rule_is_noticed(module: str, line: str, complaint: str):
     modules = sources()

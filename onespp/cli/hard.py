@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -30,6 +29,7 @@ def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
     recovers from a sudden change, and whether it keeps the energy.
     """
     use(device, threads)
+    from onespp.api.studies import judge_hard
     from onespp.denoise.studies.hard_scenes import markdown
     from onespp.scenes import catalog
     from onespp.scenes.hard import HARD
@@ -40,29 +40,10 @@ def hard(names: tuple[str, ...], out: Path, reference_spp: int, device: str,
     rows = []
     with progress() as report:
         for number, name in enumerate(names or HARD):
-            rows += _judge_hard(name, out, reference_spp,
-                                _within(report, number, len(names or HARD), name))
+            rows += judge_hard(name, out / name, reference_spp,
+                               _within(report, number, len(names or HARD), name),
+                               lambda note, name=name: click.echo(f"{name}: {note}", err=True))
     click.echo(markdown(rows))
-
-
-def _judge_hard(name: str, out: Path, reference_spp: int, report: Progress) -> list:
-    """Rows of one hard scene."""
-    from onespp.denoise.catalog import METHODS
-    from onespp.denoise.studies.hard_scenes import judge
-    from onespp.render.job import RenderJob, render_sequence
-    from onespp.render.references import reference_notes
-    from onespp.scenes.hard import HARD
-
-    hard = HARD[name]
-    scene = hard.make()
-    job = RenderJob(scene, range(scene.frames), scene.height, scene.width,
-                    reference_spp=reference_spp)
-    needed = {channel for method in METHODS.values() for channel in method.needs}
-    job = replace(job, channels=tuple(dict.fromkeys((*job.channel_names(), *sorted(needed)))))
-    sequence = render_sequence(job, out / name, progress=report)
-    for note in reference_notes(sequence, sequence.frames, reference_spp):
-        click.echo(f"{name}: {note}", err=True)
-    return judge(sequence, name, hard.event, hard.diffuse, report)
 
 
 def _within(report: Progress, number: int, count: int, name: str) -> Progress:

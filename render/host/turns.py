@@ -70,9 +70,8 @@ def check_process() -> None:
 
 
 def _finish() -> None:
-    """Wait for kernels of this thread: the next turn may be another thread's."""
-    drjit = sys.modules.get("drjit")
-    if drjit is not None and threading.current_thread() is not threading.main_thread():
+    """Wait for this thread's kernels: the next turn may be another thread's, which would not."""
+    if (drjit := sys.modules.get("drjit")) is not None:
         drjit.sync_thread()
 
 
