@@ -90,6 +90,7 @@ def check_call(frame: Frame, state: OnStencil | None, reach: int) -> Stencil:
         raise InputError(f"a method was called with a {type(frame).__name__}: give it a Frame")
     stencil = getattr(state, "stencil", None)
     if not isinstance(stencil, Stencil) or stencil.reach < reach:
-        raise InputError("a method was called with a state that is not its own: begin with that of "
-                         "its init(height, width), and go on with the one that its call returns")
+        raise InputError("a method was called with a state that is not its own: begin with None "
+                         "or that of its init(height, width), and go on with the one that its call "
+                         "returns")
     return stencil
