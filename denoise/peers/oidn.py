@@ -22,6 +22,7 @@ from onespp.denoise.inputs.repair import repair
 from onespp.denoise.methods.parameters import check_choice
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
+from onespp.render.host.turns import turn
 
 AVAILABLE = importlib.util.find_spec("pyoidn") is not None
 
@@ -63,6 +64,7 @@ class Oidn:
             raise InputError(f"an image of {width}x{height} pixels is empty")
         return OidnState(height, width, self)
 
+    @turn()
     def __call__(self, frame: Frame, state: OidnState | None) -> tuple[np.ndarray, OidnState]:
         """(h, w, 3) float32; InputError if a channel is missing or the size is another."""
         state = state or self.init(frame.height, frame.width)
