@@ -15,6 +15,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import partial
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol, TypeVar
 
@@ -31,6 +32,7 @@ from onespp.denoise.methods.parameters import renamed_parameters, with_present_n
 from onespp.denoise.methods.separable import BilateralSeparable
 from onespp.denoise.methods.svgf import Svgf
 from onespp.denoise.methods.temporal import Temporal
+from onespp.denoise.own_method import OwnMethod, from_file, installed, offers
 from onespp.denoise.peers.oidn import Oidn
 from onespp.denoise.peers.oidn_split import OidnSplit
 from onespp.denoise.peers.optix import Optix
@@ -39,6 +41,8 @@ from onespp.denoise.peers.temporal_oidn_split import TemporalOidnSplit
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.host import backend
+from onespp.render.host.versions import versions
+from onespp.user_code import is_file
 
 from .peers import oidn
 
@@ -88,8 +92,9 @@ def build(name: str, settings: Mapping[str, str] | None = None,
           note: Callable[[str], None] | None = None) -> Method[Any]:
     """A method by name, with some parameters given as text: `build("bilateral", {"radius": "8"})`.
 
-    The name is one of `METHODS` or `PEERS`. With `outliers`, frames have those removed first that
-    are farther off than so many standard deviations (`outliers.py`).
+    The name is one of `METHODS` or `PEERS`, a file's or an installed package's (`own_method.py`).
+    With `outliers`, frames have those removed first that are farther off than so many standard
+    deviations (`outliers.py`).
 
     Args:
         note: told of each parameter that is given by a former name; default a FutureWarning.
@@ -98,24 +103,45 @@ def build(name: str, settings: Mapping[str, str] | None = None,
         InputError: no such method or parameter (the message lists them), or a value that does
             not read as the parameter's type or is out of its range.
     """
-    if name not in METHODS and name not in PEERS:
-        raise InputError(f"unknown method '{name}': use {', '.join((*METHODS, *PEERS))}")
-    method = METHODS[name]() if name in METHODS else PEERS[name].make()
+    method = _made(name)
     if outliers is not None:
         method = WithoutOutliers(method, RemoveOutliers(outliers))
-    known = parameters(method)
-    typed = {}
-    named = with_present_names(settings or {}, renamed_parameters(method), note or _warn)
-    for key, text in named.items():
+    return configured(method, settings or {}, note)
+
+
+def configured(method: Method[Any], settings: Mapping[str, str],
+               note: Callable[[str], None] | None = None) -> Method[Any]:
+    """A method with some parameters changed; arguments and errors as for `build`."""
+    known, typed = parameters(method), {}
+    for key, text in with_present_names(settings, renamed_parameters(method),
+                                        note or _warn).items():
         if key not in known:
-            raise InputError(f"method '{name}' has no parameter '{key}': "
-                             f"it has {', '.join(known)}")
+            raise InputError(f"method '{name_of(method)}' has no parameter '{key}': it has "
+                             f"{', '.join(known) or 'none, since it is no dataclass'}")
         typed[key] = _parse(key, text, type(known[key]))
     return _replace(method, typed)
 
 
+def _made(name: str) -> Method[Any]:
+    """With its defaults."""
+    if name in METHODS:
+        return METHODS[name]()
+    if name in PEERS:
+        return PEERS[name].make()
+    made = from_file(name) if is_file(name) else installed(name)
+    if made is None:
+        offered = [offer.name for offer in offers()]
+        hint = f"did you mean {name}.py? " if Path(f"{name}.py").is_file() else ""
+        raise InputError(f"unknown method '{name}': {hint}use "
+                         f"{', '.join(dict.fromkeys((*METHODS, *PEERS, *offered)))}, or a file of "
+                         "your own, as my_filter.py")
+    return made
+
+
 def name_of(method: Any) -> str | None:
-    """The name under which `build` makes a method like this one; None for one of your own."""
+    """The name under which `build` makes a method like this one; None for another object."""
+    if isinstance(method, OwnMethod):
+        return method.name
     if isinstance(method, WithoutOutliers):
         inner = name_of(method.method)
         return inner and inner + OUTLIERS
@@ -127,12 +153,12 @@ def name_of(method: Any) -> str | None:
 
 
 def changed(method: Any) -> dict[str, bool | int | float | str]:
-    """The parameters that are not the method's defaults; none for one of your own."""
+    """The parameters that are not the method's defaults; none for an object of another class."""
     inner = method.method if isinstance(method, WithoutOutliers) else method
     name = name_of(inner)
     if name is None:
         return {}
-    default = parameters(build(name))
+    default = dict(inner.defaults) if isinstance(inner, OwnMethod) else parameters(build(name))
     if inner is not method:
         default.update(parameters(RemoveOutliers()))
     return {key: value for key, value in parameters(method).items() if value != default[key]}
@@ -159,6 +185,8 @@ def channels_read(method: Method, there: Iterable[str]) -> tuple[str, ...]:
 def parameters(method: Any) -> dict[str, bool | int | float | str]:
     """Parameter name -> value, those of a method's parts included; of an object that is no
     dataclass its plain attributes."""
+    if isinstance(method, OwnMethod):
+        return method.parameters()
     if not is_dataclass(method):
         return {key: value for key, value in getattr(method, "__dict__", {}).items()
                 if isinstance(value, bool | int | float | str) and not key.startswith("_")}
@@ -169,7 +197,21 @@ def parameters(method: Any) -> dict[str, bool | int | float | str]:
     return found
 
 
+def source_of(method: Any) -> str:
+    """Hash of the file that a method of one's own is from; "" of others."""
+    inner = method.method if isinstance(method, WithoutOutliers) else method
+    return inner.code.source if isinstance(inner, OwnMethod) else ""
+
+
+def versions_of(method: Any) -> dict[str, str]:
+    """Package -> version, of the packages that decide what a method does."""
+    inner = method.method if isinstance(method, WithoutOutliers) else method
+    return {**versions("drjit"), **(inner.versions if isinstance(inner, OwnMethod) else {})}
+
+
 def _replace(method: Any, values: Mapping[str, Any]) -> Any:
+    if isinstance(method, OwnMethod):
+        return method.with_values({k: v for k, v in values.items() if k in method.defaults})
     changes = {}
     for f in fields(method):
         value = getattr(method, f.name)

@@ -337,7 +337,7 @@ def all_scores(plan: Plan) -> str:
 
 def lead(plan: Plan) -> str:
     if not all(PEER in s.methods for pair in plan.pairs.values() for s in pair):
-        return f"`{PEER}` cannot run on this machine (`pip install pyoidn`)."
+        return f"`{PEER}` cannot run on this machine (`pip install mitsuba-oidn`)."
     return (f"{lead_table(BEST, BEST_FORM, plan.pairs)}\n\n"
             + "; ".join(conditions(pair[1]) for pair in plan.pairs.values())
             + f"; PSNR on {TONE_MAP}.")

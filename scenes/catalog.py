@@ -11,13 +11,14 @@ import difflib
 from collections.abc import Callable
 from pathlib import Path
 
+from onespp import entry_points
 from onespp.scenes.room.room import room
 
 from .box import box
 from .description import Scene, SceneError
 from .generated import COUNT, generated
 from .hard import HARD
-from .scene_file import load_file
+from .scene_file import installed, load_file
 
 SCENES: dict[str, Callable[[], Scene]] = {
     "box": box,
@@ -28,7 +29,8 @@ GENERATED = tuple(f"generated/{number}" for number in range(COUNT))
 
 
 def load(name: str) -> Scene:
-    """A scene of the table above, or of a Python file (see `scenes/scene_file.py`).
+    """A scene of the table above, of a Python file (see `scenes/scene_file.py`), or one that an
+    installed package offers.
 
     Raises:
         SceneError: no such scene or file, or the file raises or defines no scene; one sentence
@@ -40,13 +42,21 @@ def load(name: str) -> Scene:
         return HARD[name[len(_HARD):]].make()
     if name in GENERATED:
         return generated(GENERATED.index(name))
-    if not name.endswith(".py"):
+    if name.endswith(".py"):
+        return load_file(Path(name))
+    scene = installed(name)
+    if scene is None:
         raise SceneError(_unknown(name))
-    return load_file(Path(name))
+    return scene
+
+
+def offers() -> list[entry_points.Offer]:
+    """The scenes that installed packages offer."""
+    return entry_points.offers(entry_points.SCENES)
 
 
 def _unknown(name: str) -> str:
-    known = (*SCENES, *(_HARD + hard for hard in HARD), *GENERATED)
+    known = (*SCENES, *(_HARD + hard for hard in HARD), *GENERATED, *(o.name for o in offers()))
     close = difflib.get_close_matches(name, known, n=1)
     hint = f"did you mean '{close[0]}'? " if close else ""
     return (f"unknown scene '{name}': {hint}there are {', '.join(sorted(SCENES))}, "

@@ -21,6 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from onespp.user_code import said
+
 from . import validity
 from .transforms import Matrix, identity
 from .validity import SceneError
@@ -323,4 +325,4 @@ def _called(function: Callable[[float], Any], frame: float, what: str) -> Any:
     except (SceneError, MemoryError):
         raise
     except (Exception, SystemExit, GeneratorExit) as error:  # the author's code may raise anything
-        raise SceneError(f"{what} raises {validity.said(error)}") from error
+        raise SceneError(f"{what} raises {said(error)}") from error

@@ -65,14 +65,6 @@ def brief(value: object) -> str:
     return " ".join(_SHORT.repr(value).split())
 
 
-def said(error: BaseException) -> str:
-    """An error of an author's code, its kind and its text, on one line."""
-    try:
-        return f"{type(error).__name__}: {' '.join(str(error).split())}"
-    except Exception:  # its text is the author's code too
-        return type(error).__name__
-
-
 def number(value: Any, what: str, bounds: Bounds = ANY) -> float:
     """A finite number within bounds, as a float."""
     if isinstance(value, np.ndarray) and value.ndim == 0:

@@ -8,6 +8,7 @@ import shlex
 import sys
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
@@ -30,6 +31,7 @@ from onespp.denoise.metrics.table import MEASURES
 from onespp.denoise.metrics.tonemap import srgb_from_linear
 from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
+from onespp.user_code import is_file
 from tests.support.frames import make_frame, noisy
 from tests.support.report_sequence import make_report_sequence
 
@@ -43,7 +45,7 @@ CODE = re.compile(r"`([^`\n]+)`")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 FOREIGN = {"ruff", "pyright", "pip", "python3"}  # programs whose options are not ours
 
-UNKNOWN = {"my_scene.py"}  # the reader's
+UNKNOWN = {"my_scene.py", "my_filter.py", "my_metric.py"}  # the reader's
 
 def blocks(page: str, language: str) -> list[tuple[str, str]]:
     """(what stands behind the language, text) of the code blocks of a page."""
@@ -199,8 +201,16 @@ def test_python_blocks_run(page, folder, call):
     module = ModuleType("page")  # a dataclass looks its module up
     sys.modules["page"] = module
     try:
-        for number, (_, code) in enumerate(blocks(page, "python"), 1):
-            exec(compile(code, f"{page}, Python block {number}", "exec"), names)
+        for number, (info, code) in enumerate(blocks(page, "python"), 1):
+            compiled = compile(code, f"{page}, Python block {number}", "exec")
+            if info and find_spec(info) is None:  # a package that this block needs
+                continue
+            exec(compiled, names)
+            if "class MyFilter" in code:
+                Path("my_filter.py").write_text(code)
+                call("render", "box", "--frames", "0:1", "--size", "16x9", "--out", "data/box")
+                done, _, err = call("denoise", "data/box", "--method", "my_filter.py")
+                assert done == 0, err
             if "def scene(" in code:
                 Path("my_scene.py").write_text(code)
                 code, out, err = call("render", "my_scene.py", "--frames", "0:1", "--size", "16x9",
@@ -312,6 +322,8 @@ def check_settings(words: list[str]) -> None:
     """Parameters of `--set` are a method's: the one that is named, or any."""
     settings = pairs(b for a, b in pairwise(words) if a == "--set")
     named = [b for a, b in pairwise(words) if a == "--method"]
+    if any(map(is_file, named)):
+        return  # the reader's
     for key, value in settings.items():
         able = [name for name in named or METHODS if key in parameters(build(name))]
         assert able, f"no method has the parameter {key}"

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any
@@ -26,7 +26,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from onespp.denoise.catalog import build
+from onespp.denoise.catalog import Method, build
 from onespp.denoise.inputs.color import read_color
 from onespp.denoise.inputs.surface import read_surface
 from onespp.denoise.methods.asvgf import AsvgfState
@@ -104,20 +104,21 @@ KERNELS = {
 class Row:
     """Milliseconds, shares and memory of one kernel.
 
-    None where there is no yardstick, no count, or no second thread.
+    None where there is no yardstick, no count, or no second thread; of a method without kernels of
+    ours, all but the calls.
     """
 
-    ms: float
+    ms: float | None
     call_ms: float
     first_ms: float
     share_of_oidn_fast: float | None
     call_share_of_oidn_fast: float | None
-    max_error: float
+    max_error: float | None
     share_of_bandwidth: float | None
     share_of_arithmetic: float | None
     speed_up: float | None
-    peak_mb: float
-    bytes_a_pixel: float
+    peak_mb: float | None
+    bytes_a_pixel: float | None
 
 
 @dataclass(frozen=True)
@@ -139,15 +140,20 @@ class Bench:
         return json.dumps(asdict(self), indent=2) + "\n"
 
 
-def bench(height: int, width: int, repeats: int,
-          progress: Progress = silent) -> Bench:
-    """Measure every kernel, in rounds."""
+def bench(height: int, width: int, repeats: int, progress: Progress = silent,
+          others: Mapping[str, Method] | None = None) -> Bench:
+    """Measure every kernel, in rounds.
+
+    Args:
+        others: methods whose calls alone are timed, by name.
+    """
     total, what = repeats + 2, f"bench {width}x{height}"
     runs = {name: _Run(name, height, width) for name in KERNELS}
+    calls = {name: _Calls(method, height, width) for name, method in (others or {}).items()}
     network = _Network(height, width) if AVAILABLE else None
     progress(1, total, what)
     for i in range(repeats):
-        for run in (network, *runs.values()):
+        for run in (network, *runs.values(), *calls.values()):
             if run:
                 run.measure(i % FRAMES)
         measure_one_thread(runs.values(), i % FRAMES)
@@ -163,6 +169,9 @@ def bench(height: int, width: int, repeats: int,
                          kernel.operations and kernel.operations * per_ms / arithmetic,
                          median(run.one_thread_ms) / ms if run.one_thread_ms else None,
                          run.peak_mb, run.peak_mb * 2**20 / (height * width))
+    for name, run in calls.items():
+        call = median(run.call_ms)
+        rows[name] = Row(None, call, run.first_ms, None, oidn and call / oidn, *[None] * 6)
     progress(total, total, what)
     return Bench(rows, width, height, repeats, oidn, bandwidth, arithmetic, backend.choose(),
                  dr.thread_count(), platform.processor() or platform.machine())
@@ -222,28 +231,40 @@ def measure_one_thread(runs: Iterable[_Run], i: int) -> None:
         dr.set_thread_count(threads)
 
 
-class _Run:
-    """A method with its state, and its times."""
+class _Calls:
+    """A method with its state, and the times of its calls."""
 
-    def __init__(self, name: str, height: int, width: int) -> None:
-        self.method: Any = build(name)
+    def __init__(self, method: Any, height: int, width: int) -> None:
+        self.method = method
         self.frames = [probe(height, width, i) for i in range(FRAMES)]
-        self.kernel_frames = [probe(height, width, i, KERNELS[name].textured)
-                              for i in range(FRAMES)]
-        self.state, self.kernel_state = (self.method.init(height, width) for _ in range(2))
-        self.ms: list[float] = []
+        self.state = method.init(height, width)
         self.call_ms: list[float] = []
-        self.one_thread_ms: list[float] = []
-        self.first_ms = timed(lambda: self.method(self.frames[0], self.state))[1]
+        self.first_ms = timed(lambda: method(self.frames[0], self.state))[1]
         for i in range(WARM_UP):
             self.measure(i)
-        self.ms.clear()
         self.call_ms.clear()
-        self.peak_mb = self._peak(height, width)
 
     def measure(self, i: int) -> None:
         (_, self.state), ms = timed(lambda: self.method(self.frames[i], self.state))
         self.call_ms.append(ms)
+
+
+class _Run(_Calls):
+    """A method of ours, with the times of its kernel too."""
+
+    def __init__(self, name: str, height: int, width: int) -> None:
+        method: Any = build(name)
+        self.kernel_frames = [probe(height, width, i, KERNELS[name].textured)
+                              for i in range(FRAMES)]
+        self.kernel_state = method.init(height, width)
+        self.ms: list[float] = []
+        self.one_thread_ms: list[float] = []
+        super().__init__(method, height, width)
+        self.ms.clear()
+        self.peak_mb = self._peak(height, width)
+
+    def measure(self, i: int) -> None:
+        super().measure(i)
         self.ms.append(self.measure_kernel(i))
 
     def measure_kernel(self, i: int) -> float:

@@ -11,14 +11,18 @@ from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import progress
 from onespp.render.files.sequence import FrameSequence
 
+from .options import json_option, show_or_print
+
 
 @click.command()
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path),
                 metavar="DIR...")
 @click.option("--method", default="svgf", show_default=True, metavar="NAME")
+@json_option
 @device_option
 @threads_option
-def ablate(folders: tuple[Path, ...], method: str, device: str, threads: int | None) -> None:
+def ablate(folders: tuple[Path, ...], method: str, json_to: str | None, device: str,
+           threads: int | None) -> None:
     """Print what each part of a method is worth on the sequences in DIR, as Markdown."""
     use(device, threads)
     from onespp.denoise.studies.ablation import ablate as ablate_sequence
@@ -35,5 +39,9 @@ def ablate(folders: tuple[Path, ...], method: str, device: str, threads: int | N
             notes.append(f"{folder.name}: {m.scene}, {len(m.frames)} frames of "
                          f"{m.width}x{m.height}, {made}, "
                          f"reference {m.reference_spp or 'of unknown'} spp")
-    click.echo(markdown(method, results))
-    click.echo("\n" + "; ".join(notes) + f"; means over frames, PSNR on {TONE_MAP}.")
+
+    def show() -> None:
+        click.echo(markdown(method, results))
+        click.echo("\n" + "; ".join(notes) + f"; means over frames, PSNR on {TONE_MAP}.")
+
+    show_or_print({"method": method, "tone_map": TONE_MAP, "sequences": results}, json_to, show)

@@ -30,8 +30,11 @@ def compare(a: Path, b: Path, methods: tuple[str, ...], thresholds: tuple[str, .
     """
     from onespp.denoise.report.comparison import print_comparison
     from onespp.denoise.score.compare import parse_thresholds
+    from onespp.denoise.score.scorecard import read_scores
 
-    found = api.compare(a, b, methods, parse_thresholds(thresholds))
+    old, new = read_scores(a), read_scores(b)
+    found = api.compare(old, new, methods, parse_thresholds(
+        thresholds, {**old.own_metrics, **new.own_metrics}))
     show_or_print(found.json_text(), json_to, lambda: print_comparison(found, show_all))
     if found.failed:
         sys.exit(1)

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from click.core import ParameterSource
 
 from onespp.denoise.methods.parameters import pairs
+from onespp.denoise.own_method import result_name
 from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import command_line, note, progress
 from onespp.render.errors import InputError
 from onespp.render.files.lock import writing
+from onespp.render.files.manifest import check_result_name
 from onespp.render.files.sequence import FrameSequence
+
+if TYPE_CHECKING:
+    from onespp.denoise.catalog import Method
 
 DEFAULT_METHODS = ("onespp",)
 
@@ -20,8 +27,9 @@ DEFAULT_METHODS = ("onespp",)
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--method", "methods", multiple=True, metavar="NAME", default=DEFAULT_METHODS,
-              show_default=True, help="One of `--list`, all, or oidn (its three qualities); may be "
-              "given several times.")
+              show_default=True, help="One of `--list`, all, oidn (its three qualities), or a "
+              "file of your own, as my_filter.py or my_filter.py:MyFilter; may be given several "
+              "times.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE",
               help="A parameter of the method; may be given several times.")
 @click.option("--outliers", type=float, metavar="K",
@@ -56,15 +64,15 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
                name: str | None = None, outliers: float | None = None,
                default: bool = False) -> None:
     """Do what the options of `denoise` ask; `default`: nobody chose the methods."""
-    from onespp.denoise.catalog import OUTLIERS, build
+    from onespp.denoise.catalog import OUTLIERS
     from onespp.denoise.run.several import denoise_by, what_to_know
 
     sequence = FrameSequence.open(folder)
-    chosen = _names(methods)
+    chosen = method_names(methods)
     if name is not None and len(chosen) > 1:
         raise InputError(f"--name {name} is one name for {len(chosen)} methods: give one --method")
-    denoisers = {method + (OUTLIERS if outliers is not None else "") if name is None else name:
-                 build(method, pairs(settings), outliers, note) for method in chosen}
+    denoisers = {made + (OUTLIERS if outliers is not None else "") if name is None else name: method
+                 for made, method in built(chosen, pairs(settings), outliers).items()}
     with progress() as report:
         done = denoise_by(sequence, denoisers, report, command_line())
     for name, (_, pace) in done.items():
@@ -83,11 +91,28 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
 def check_methods(methods: tuple[str, ...], channels: tuple[str, ...]) -> None:
     """InputError for methods that `denoise_in` would refuse for frames with these channels asked
     for: said before hours of rendering."""
-    from onespp.denoise.catalog import build
+    from onespp.denoise.catalog import check_not_a_method, name_of
     from onespp.denoise.run.several import check_replay
 
-    for name in _names(methods):
-        check_replay(name, build(name).needs, channels, "this run")
+    for name, method in built(method_names(methods)).items():
+        check_result_name(name)
+        check_not_a_method(name, name_of(method))
+        check_replay(name, method.needs, channels, "this run")
+
+
+def built(methods: Iterable[str], settings: Mapping[str, str] | None = None,
+          outliers: float | None = None) -> dict[str, Method]:
+    """Name of its results -> method; InputError where two would be called the same."""
+    from onespp.denoise.catalog import build
+
+    found: dict[str, Method] = {}
+    for name in methods:
+        called = result_name(name)
+        if called in found:
+            raise InputError(f"the results of two methods would be called '{called}': denoise by "
+                             f"one of them after the other, {name} with a --name of its own")
+        found[called] = build(name, settings, outliers, note)
+    return found
 
 
 def _denoise_externally(folder: Path, command: str, name: str) -> None:
@@ -100,7 +125,7 @@ def _denoise_externally(folder: Path, command: str, name: str) -> None:
                f"({run.first_ms:.0f} ms a frame, files included)")
 
 
-def _names(methods: tuple[str, ...]) -> list[str]:
+def method_names(methods: tuple[str, ...]) -> list[str]:
     """The methods meant, `all` and `oidn` replaced by what they stand for."""
     from onespp.denoise.catalog import METHODS, PEERS
     from onespp.denoise.peers.oidn import QUALITIES
@@ -112,8 +137,23 @@ def _names(methods: tuple[str, ...]) -> list[str]:
 
 def _list(context: click.Context) -> None:
     from onespp.denoise.catalog import build, described, parameters
+    from onespp.denoise.own_method import about_own, offers
 
-    for name, line in described().items():
+    about = described()
+    for name, line in about.items():
         click.echo(f"{name}: {line}")
         click.echo("    " + ", ".join(f"{k}={v}" for k, v in parameters(build(name)).items()))
+    for offer in offers():
+        if offer.name in about:
+            click.echo(f"{offer.name} of the package {offer.package} {offer.version} is hidden by "
+                       "ours of that name")
+            continue
+        try:
+            method = build(offer.name)
+        except InputError as error:  # one broken package does not keep the others from view
+            click.echo(f"{offer.name}: not usable, {error}")
+            continue
+        click.echo(f"{offer.name}: {about_own(method)}Of the package {offer.package} "
+                   f"{offer.version}.")
+        click.echo("    " + ", ".join(f"{k}={v}" for k, v in parameters(method).items()))
     context.exit()

@@ -11,7 +11,8 @@ from onespp.render.cli.terminal import command_line, progress
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import FrameSequence
 
-from .denoise import _names
+from .denoise import built, method_names
+from .options import json_option, show_or_print
 
 
 @click.command("time")
@@ -22,21 +23,28 @@ from .denoise import _names
               help="Frames denoised in each round, the first ones of the sequence.")
 @click.option("--rounds", type=click.IntRange(1), default=5, show_default=True, metavar="N",
               help="Rounds that count; one more goes before them.")
+@json_option
 @device_option
 @threads_option
-def time_(folder: Path, methods: tuple[str, ...], frames: int, rounds: int, device: str,
-          threads: int | None) -> None:
+def time_(folder: Path, methods: tuple[str, ...], frames: int, rounds: int, json_to: str | None,
+          device: str, threads: int | None) -> None:
     """Time methods in turns on the sequence in FOLDER; `score` then uses these times."""
     use(device, threads)
-    from onespp.denoise.catalog import build
+    from onespp.denoise.catalog import name_of
     from onespp.denoise.run.interleaved_timing import time_methods
 
     sequence = FrameSequence.open(folder)
-    chosen = {name: build(name) for name in _names(methods)}
+    chosen = {name_of(method) or name: method
+              for name, method in built(method_names(methods)).items()}
     with writing(folder, "time"), progress() as report:
         times = time_methods(sequence, chosen, frames, rounds, report, command_line())
-    for name, t in times.methods.items():
-        click.echo(f"{name}: {t.ms:.1f} ms ({t.ms_quartiles[0]:.1f} to {t.ms_quartiles[1]:.1f}), "
-                   f"{t.ratio:.2f} times {times.ratio_to} ({t.ratio_quartiles[0]:.2f} to "
-                   f"{t.ratio_quartiles[1]:.2f}), first frame {t.first_ms:.0f} ms")
-    click.echo(f"medians and quartiles of {times.steps} steps; wrote {folder / 'times.json'}")
+
+    def show() -> None:
+        for name, t in times.methods.items():
+            click.echo(
+                f"{name}: {t.ms:.1f} ms ({t.ms_quartiles[0]:.1f} to {t.ms_quartiles[1]:.1f}), "
+                f"{t.ratio:.2f} times {times.ratio_to} ({t.ratio_quartiles[0]:.2f} to "
+                f"{t.ratio_quartiles[1]:.2f}), first frame {t.first_ms:.0f} ms")
+        click.echo(f"medians and quartiles of {times.steps} steps; wrote {folder / 'times.json'}")
+
+    show_or_print(times, json_to, show)

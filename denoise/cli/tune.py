@@ -13,6 +13,8 @@ from onespp.render.cli.terminal import note, progress
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import FrameSequence
 
+from .options import json_option, show_or_print
+
 
 @click.command()
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path),
@@ -24,10 +26,12 @@ from onespp.render.files.sequence import FrameSequence
               help="Where the search starts; default the method's defaults.")
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE",
               help="Keep what was tried in FILE (JSON); the same command goes on from there.")
+@json_option
 @device_option
 @threads_option
 def tune(folders: tuple[Path, ...], method: str, names: tuple[str, ...],
-         settings: tuple[str, ...], out: Path | None, device: str, threads: int | None) -> None:
+         settings: tuple[str, ...], out: Path | None, json_to: str | None, device: str,
+         threads: int | None) -> None:
     """Search parameters of a method for the best mean PSNR on the sequences in DIR.
 
     Give other frames and seeds than those that you report scores of.
@@ -36,18 +40,28 @@ def tune(folders: tuple[Path, ...], method: str, names: tuple[str, ...],
     from onespp.denoise.catalog import build
     from onespp.denoise.studies.tune import Search, read_case, starting_point
 
-    start = starting_point(method, pairs(settings), note)
-    renamed = renamed_parameters(build(method))
-    names = tuple(with_present_names(dict.fromkeys(names), renamed, note))
+    denoiser = build(method, pairs(settings), note=note)
+    start = starting_point(denoiser)
+    names = tuple(with_present_names(dict.fromkeys(names), renamed_parameters(denoiser), note))
     unknown = [name for name in names if name not in start]
     if unknown:
         raise InputError(f"method '{method}' has no parameter '{unknown[0]}': "
-                         f"it has {', '.join(start)}")
-    cases = [read_case(FrameSequence.open(folder), build(method)) for folder in folders]
+                         f"it has {', '.join(start) or 'none'}")
+    if not start:
+        raise InputError(f"method '{method}' has no parameter to search: give it one, the field of "
+                         "a dataclass that is a number, or true or false")
+    cases = [read_case(FrameSequence.open(folder), denoiser) for folder in folders]
     with progress() as report:
-        search = Search(method, start, cases, out, report)
+        search = Search(denoiser, cases, out, report)
         found, value = search.run(list(names) or list(start))
-    click.echo(f"{value:.2f} dB on {TONE_MAP}, mean over {', '.join(c.name for c in cases)}; "
-               f"{search.value(start):.2f} dB at the start; {len(search.tried)} settings tried")
     changed = {k: v for k, v in found.items() if v != start[k]}
-    click.echo(" ".join(f"--set {k}={v}" for k, v in changed.items()) or "nothing better found")
+
+    def show() -> None:
+        click.echo(f"{value:.2f} dB on {TONE_MAP}, mean over {', '.join(c.name for c in cases)}; "
+                   f"{search.value(start):.2f} dB at the start; {len(search.tried)} settings tried")
+        click.echo(" ".join(f"--set {k}={v}" for k, v in changed.items())
+                   or "nothing better found")
+
+    show_or_print({"method": method, "sequences": [c.name for c in cases], "psnr_srgb": value,
+                   "psnr_srgb_at_start": search.value(start), "tried": len(search.tried),
+                   "changed": changed}, json_to, show)

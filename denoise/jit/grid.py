@@ -20,6 +20,7 @@ scatter would cost five times as much, and in a frozen function it silently writ
 # pyright: standard
 from __future__ import annotations
 
+import importlib
 from collections.abc import Sequence
 from numbers import Integral
 from types import ModuleType
@@ -36,6 +37,8 @@ from onespp.render.host.turns import check_process
 from .arrays import Float
 from .structure import arrays_of
 from .taps import Offset, Taps, _listed
+
+_BACKENDS = {"llvm": dr.JitBackend.LLVM, "cuda": dr.JitBackend.CUDA, "metal": dr.JitBackend.Metal}
 
 _TAIL = 64  # floats after the last lane that a vector load may touch
 _LINE = 16  # floats in a cache line
@@ -69,7 +72,7 @@ class Stencil:
         check_process()
         device = backend.choose(device)
         self.layout = layout or ("views" if device == "llvm" else "gather")
-        if self.layout not in ("views", "gather") or (self.layout, device) == ("views", "cuda"):
+        if self.layout not in ("views", "gather") or (self.layout == "views" and device != "llvm"):
             raise InputError(f"layout '{self.layout}' does not exist on {device}: use gather")
         self.height, self.width, self.reach = int(height), int(width), max(reach, 1)
         self.stride = _spread(width + self.reach)
@@ -78,7 +81,7 @@ class Stencil:
         module = _module(device)
         self.Float, self.Int, self.UInt = module.Float, module.Int, module.UInt
         self.Array4f, self.ArrayXf = module.Array4f, module.ArrayXf
-        self.backend = dr.JitBackend.LLVM if device == "llvm" else dr.JitBackend.CUDA
+        self.backend = _BACKENDS[device]
 
     @property
     def top(self) -> int:
@@ -195,11 +198,7 @@ def _spread(least: int) -> int:
 
 
 def _module(device: str) -> ModuleType:
-    if device == "llvm":
-        import drjit.llvm as module
-    else:
-        import drjit.cuda as module
-    return module
+    return importlib.import_module(f"drjit.{device}")
 
 
 class Planes:

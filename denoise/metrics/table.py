@@ -62,12 +62,11 @@ def measure(image: np.ndarray, reference: np.ndarray) -> dict[str, float | None]
         >>> round(scores["psnr_srgb"], 2), round(scores["energy_error"], 2)
         (25.59, 0.2)
     """
-    return measure_pair(pair(image, reference), METRICS)
+    return measure_pair(pair(image, reference), METRICS.values())
 
 
-def measure_pair(images: Pair, names: Iterable[str]) -> dict[str, float | None]:
-    """The named rows of `METRICS`, against the mean of a reference."""
-    rows = [METRICS[name] for name in names]
+def measure_pair(images: Pair, rows: Iterable[Metric]) -> dict[str, float | None]:
+    """Rows of `METRICS`, or such as these, against the mean of a reference."""
     return {row.name: row.function(*getattr(images, row.space)) for row in rows}
 
 

@@ -26,35 +26,53 @@ def texture_of(frame: Frame) -> np.ndarray:
 
 
 def unshadowed_of(frame: Frame) -> dict[str, np.ndarray]:
-    """U of each visibility: of V or, where lights are in groups, of what the BSDF's sample finds,
-    also V, and of each group, by its number."""
-    whole = frame["unshadowed"].astype(float)
+    """U of each visibility: of V or, where lights are in groups, of each group, by its number."""
     groups = {name[10:]: frame[name].astype(float) for name in sorted(frame.images)
               if name.startswith("unshadowed") and name != "unshadowed"}
-    rest = np.maximum(whole - sum(groups.values()), 0) if groups else whole
-    some = lum(rest) > (1e-5 * lum(whole) if groups else -1)
-    return {"V": np.where(some[..., None], rest, 0), **groups}
+    return groups or {"V": frame["unshadowed"].astype(float)}
 
 
 def signals_of(frame: Frame) -> dict[str, np.ndarray]:
     """L, G and V, (h, w, c), then y of each group."""
     light = frame["direct"].astype(float) + frame["indirect"] - frame["specular"]
     unshadowed = unshadowed_of(frame)
-    v, told = frame["visibility"].astype(float), {}
+    told, chance = {"V": np.minimum(frame["visibility"].astype(float), 2)[..., None]}, 1.0
     if "group" in frame:
-        y, _, chance = np.moveaxis(frame["group_sample"].astype(float), -1, 0)
+        y, _, chance = np.moveaxis(frame["group_sample"].astype(float)[..., None], -2, 0)
+        told = {g: np.where((frame["group"] == int(g))[..., None], np.minimum(y, 2), 0)
+                for g in sorted(unshadowed)}
         chance = np.where(chance > 0, chance, np.inf)
-        whole, rest = lum(frame["unshadowed"].astype(float)), lum(unshadowed["V"])
-        found = v * whole
-        for g in unshadowed.keys() - {"V"}:
-            here = frame["group"] == int(g)
-            told[g] = np.where(here, np.minimum(y, 2), 0)[..., None]
-            found = found - np.where(here, y / chance * lum(unshadowed[g]), 0)
-            light = light - told[g] / chance[..., None] * unshadowed[g]
-        v = np.where(rest > 0, np.maximum(found, 0) / np.where(rest > 0, rest, 1), 1)
-    v = np.minimum(v, 2)[..., None]
-    return {"L": (light - v * unshadowed["V"]) / texture_of(frame),
-            "G": frame["specular"].astype(float), "V": v, **dict(sorted(told.items()))}
+    for name, v in told.items():
+        light = light - v / chance * unshadowed[name]
+    mirrored = np.zeros_like(light)
+    if "roughness" in frame:  # where nothing is diffuse, all that is left is G
+        bare = (texture_of(frame) >= 1).all(-1) & (roughness_of(frame) < 1)
+        mirrored = np.where(bare[..., None], light, 0)
+    return {"L": (light - mirrored) / texture_of(frame),
+            "G": frame["specular"] + mirrored, **told}
+
+
+def roughness_of(frame: Frame) -> np.ndarray:
+    return frame["roughness"].astype(float).reshape(frame["id"].shape)
+
+
+def turn_of(previous: Frame, frame: Frame) -> np.ndarray:
+    """How far mirror directions have turned, in lobes; in world space."""
+    ids = np.maximum(frame["id"], 0)
+    back = np.array([before @ np.linalg.inv(now) for before, now in zip(
+        previous.world_from_object, frame.world_from_object)])[ids]
+    x, n = frame["position"].astype(float), frame["normal"].astype(float)
+    x_before = np.einsum("hwij,hwj->hwi", back[..., :3, :3], x) + back[..., :3, 3]
+    n_before = np.einsum("hwji,hwj->hwi", np.linalg.inv(back[..., :3, :3]), n)
+
+    def mirrored(of: Frame, x: np.ndarray, n: np.ndarray) -> np.ndarray:
+        v = x - np.linalg.inv(of.camera_from_world)[:3, 3]
+        v = v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-15)
+        n = n / np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-15)
+        return v - 2 * (v * n).sum(-1, keepdims=True) * n
+
+    d = mirrored(frame, x, n) - mirrored(previous, x_before, n_before)
+    return np.minimum(np.linalg.norm(d, axis=-1) / (2 * roughness_of(frame) + 0.005), 1)
 
 
 def color_of(frame: Frame, signals: dict[str, np.ndarray]) -> np.ndarray:
@@ -119,7 +137,7 @@ def spread(frame: Frame, energy: np.ndarray, counts: np.ndarray, levels: int, m,
     return energy
 
 
-def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, sigma: float,
+def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, sigma: np.ndarray,
            fade: np.ndarray, narrow: np.ndarray, m, counts: np.ndarray | None = None) -> np.ndarray:
     """The last filter; its last level's taps are weaker by `fade`, all by exp(-narrow r^2), and a
     pixel weighs as much as it counts."""
@@ -127,7 +145,8 @@ def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, s
     counts = np.ones(shape) if counts is None else counts
     for i in range(levels):
         weaker = fade if i == levels - 1 else np.ones_like(fade)
-        pixels = pixels_of(frame, x=image, v=variance, fade=weaker, narrow=narrow, counts=counts)
+        pixels = pixels_of(frame, x=image, v=variance, fade=weaker, narrow=narrow, counts=counts,
+                           sigma=sigma)
         total, squares, weights = np.zeros_like(image), np.zeros(shape), np.zeros(shape)
         alike = np.zeros(shape)
         for dy in (-1, 0, 1):
@@ -138,7 +157,7 @@ def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, s
                 w = geometry(p, q, dy, dx, m)
                 if dy or dx:
                     deviations = (lum(q.x) - lum(p.x)) / (np.sqrt(p.v) + 1e-6)
-                    w = w * p.fade * np.exp(-(deviations / sigma) ** 2
+                    w = w * p.fade * np.exp(-(deviations / p.sigma) ** 2
                                             - p.narrow * (dy * dy + dx * dx) * 4**i)
                 alike[where] += w
                 w = w * q.counts
@@ -347,8 +366,14 @@ def run(frames: list[Frame], m) -> np.ndarray:
                     s2 = np.where(better & moves, both[..., -1], s2)
                     h = np.where((better & moves)[..., None], there, h)
                     energy = np.maximum(energy + np.minimum(excess[..., 0], 0), 0)
-                noise = np.where(found, np.maximum(energy - s2, energy / 4), noise)
-            a, follow = np.maximum(1 / n, alpha), np.maximum(m.sharp_min_gain, alpha)
+                same = found
+                if name == "G" and "roughness" in frame:
+                    turn = turn_of(previous, frame)
+                    alpha, same = np.where(found, np.maximum(alpha, turn), alpha), (
+                        found & (turn <= 0.5))
+                noise = np.where(same, np.maximum(energy - s2, energy / 4), noise)
+            a = np.maximum(1 / n, alpha)
+            follow = np.maximum(m.sharp_min_gain, a)
             if sparse:
                 a = np.where(found, np.maximum(1 / (samples + omega + 0.5), alpha), 1)
             if name != "G":
@@ -357,10 +382,11 @@ def run(frames: list[Frame], m) -> np.ndarray:
                 a = a if name == "L" else np.maximum(a, m.change_alpha * certain)
             if sparse:
                 norm = norm_of(frame, here, found, smoothing, m, narrow)[..., None]
-                mean = np.clip(h + norm * wide, 0, 1)[..., 0]
+                change = np.clip(h + norm * wide, -0.5, 2) - h
+                mean = np.clip(h + change, 0, 1)[..., 0]
                 noise = np.where(found, np.maximum(mean * (1 - mean), 0.01), noise)
-                rest = e - here[..., None] * norm * wide
-                history = h + follow[..., None] * norm * wide + np.minimum(a, 1)[..., None] * rest
+                rest = e - here[..., None] * change
+                history = h + follow[..., None] * change + np.minimum(a, 1)[..., None] * rest
                 history = np.where(found[..., None], history, np.where(omega[..., None] > 0,
                                                                        lone, 0.5))
                 samples = samples + omega
@@ -372,7 +398,11 @@ def run(frames: list[Frame], m) -> np.ndarray:
             if sparse:
                 s2 = np.where(samples <= 1e-5, 0.25, s2)
             fade = np.clip(1 - ((samples if sparse else n) - 1) / m.fade_frames, 0, 1)
-            out[name] = guided(frame, history, s2, levels, sigma, fade, narrow, m,
+            sigmas = sigma + 0 * n
+            if name == "G" and "roughness" in frame:
+                least = min(m.mirror_sigma / sigma, 1)
+                sigmas = sigma * np.clip(roughness_of(frame) / 0.1, least, 1)
+            out[name] = guided(frame, history, s2, levels, sigmas, fade, narrow, m,
                                np.clip(samples, 1e-5, 1) if sparse else None)
             if sparse:
                 history = np.where(samples[..., None] > 1e-5, history, out[name])

@@ -3,16 +3,18 @@
 It gets HDR colour, and albedo and normal where a frame has an albedo (it takes no normal without
 one). Emission, where a frame has it, is no noise: it is taken out before and put back after, which
 is worth 4 dB on the box, whose lamp would bleed. Bad pixels of the colour are repaired as for
-every method (`surface.repair`); guides that are not finite count as albedo 1 and normal 0. Images
-lie in buffers that it reads in place, and the network is set up in `init`, so that a call is one
-copy of the inputs and the filter.
+every method (`surface.repair`); guides that are not finite count as albedo 1 and normal 0. It runs
+where kernels run (`backend.choose`), on the CPU in Dr.Jit's own threads. Images are copied into
+buffers of that device, and the network is set up once, so that a call is the copies and the filter.
 
-`pip install pyoidn` brings it; `AVAILABLE` says whether it is there.
+`pip install mitsuba-oidn` brings it; `AVAILABLE` says whether it is there.
 """
 
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -22,9 +24,10 @@ from onespp.denoise.inputs.repair import repair
 from onespp.denoise.methods.parameters import check_choice
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
+from onespp.render.host import backend
 from onespp.render.host.turns import turn
 
-AVAILABLE = importlib.util.find_spec("pyoidn") is not None
+AVAILABLE = importlib.util.find_spec("mitsuba_oidn") is not None
 
 QUALITIES = ("high", "balanced", "fast")
 AUXILIARY = ("clean", "noisy")
@@ -55,11 +58,11 @@ class Oidn:
         """Buffers and networks for frames of one size.
 
         Raises:
-            InputError: pyoidn is not installed, its library doesn't load, or the size is empty.
+            InputError: mitsuba-oidn is missing or does not load, or the size is empty.
         """
         if not AVAILABLE:
             raise InputError("Open Image Denoise is not installed: "
-                             "run `pip install pyoidn`")
+                             "run `pip install mitsuba-oidn`")
         if height < 1 or width < 1:
             raise InputError(f"an image of {width}x{height} pixels is empty")
         return OidnState(height, width, self)
@@ -81,58 +84,52 @@ class Oidn:
 
 
 class OidnState:
-    """A device, its buffers, and the filters made so far; freed with the object."""
+    """A device, a buffer for each image, and the filters made so far; freed with the object."""
 
     def __init__(self, height: int, width: int, settings: Oidn) -> None:
-        import drjit as dr
-
+        kind = {"llvm": "CPU", "cuda": "CUDA", "metal": "Metal"}[backend.choose()]
         try:
-            import pyoidn
-            self._oidn = pyoidn
-            self._device = pyoidn.Device()
+            import mitsuba_oidn as oidn
         except (ImportError, OSError) as error:
             raise InputError(f"Open Image Denoise does not load ({error}): "
-                             "run `pip install --force-reinstall pyoidn`") from error
-        self.height, self.width, self._settings = height, width, settings
-        self._device.set_int("numThreads", dr.thread_count())
-        self._device.set_bool("setAffinity", False)  # it would pin threads that others share
-        self._device.commit()
-        self._images = {name: np.zeros((height, width, 3), np.float32)
-                        for name in ("color", "albedo", "normal", "output")}
+                             "run `pip install --force-reinstall mitsuba-oidn`") from error
+        self.height, self.width, self._oidn, self._settings = height, width, oidn, settings
+        with _failures():
+            self._device = oidn.Device(getattr(oidn.DeviceType, kind))
+            self._buffers = {name: self._device.new_buffer(height * width * 12, oidn.Storage.Device)
+                             for name in ("color", "albedo", "normal", "output")}
         self._filters: dict[bool, Any] = {}
-        self._check()
 
     def run(self, guided: bool, **images: np.ndarray) -> np.ndarray:
         """Copy the images in, run the filter, copy the result out."""
-        for name, image in images.items():
-            self._images[name][:] = image
-        if guided not in self._filters:
-            self._filters[guided] = self._filter(["output", *images])
-        self._filters[guided].execute()
-        self._check()
-        return self._images["output"].copy()
+        result = np.empty((self.height, self.width, 3), np.float32)
+        with _failures():
+            for name, image in images.items():
+                self._buffers[name].write(np.ascontiguousarray(image, np.float32))
+            if guided not in self._filters:
+                self._filters[guided] = self._filter(["output", *images])
+            self._filters[guided].execute()
+            self._buffers["output"].read(result)
+        return result
 
     def _filter(self, names: list[str]) -> Any:
-        oidn = self._oidn
-        made = oidn.Filter(self._device, oidn.OIDN_FILTER_TYPE_RT)
+        made = self._device.new_filter("RT")
         for name in names:
-            made.set_image(name, self._images[name], oidn.OIDN_FORMAT_FLOAT3)
-        made.set_bool("hdr", True)
-        made.set_bool("cleanAux", self._settings.auxiliary == "clean" and "albedo" in names)
-        made.set_quality(getattr(oidn, f"OIDN_QUALITY_{self._settings.quality.upper()}"))
-        made.commit()
-        self._check()
+            made.set_image(name, self._buffers[name], format=self._oidn.Format.Float3,
+                           width=self.width, height=self.height)
+        made.hdr = True
+        made.clean_aux = self._settings.auxiliary == "clean" and "albedo" in names
+        made.quality = self._oidn.Quality[self._settings.quality.capitalize()]
         return made
 
-    def _check(self) -> None:
-        if error := self._device.get_error():
-            raise InputError(f"Open Image Denoise failed ({error})")
 
-    def __del__(self) -> None:
-        for made in getattr(self, "_filters", {}).values():
-            made.release()
-        if hasattr(self, "_device"):
-            self._device.release()
+@contextmanager
+def _failures() -> Iterator[None]:
+    """Its errors, as of memory or a driver, in a sentence of ours."""
+    try:
+        yield
+    except RuntimeError as error:
+        raise InputError(f"Open Image Denoise failed ({error})") from error
 
 
 def emission_of(frame: Frame) -> np.ndarray:

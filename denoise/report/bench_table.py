@@ -22,12 +22,13 @@ def print_bench(result: Bench, console: Console | None = None) -> None:
     title = f"{result.width}x{result.height}, {result.device}, {result.threads} threads"
     speed, limits = _grid(title, SPEED), _grid(None, LIMITS)
     for name, row in result.kernels.items():
-        speed.add_row(name, f"{row.ms:.1f}", _number(row.share_of_oidn_fast, 3),
+        speed.add_row(name, _number(row.ms, 1), _number(row.share_of_oidn_fast, 3),
                       f"{row.call_ms:.1f}", _number(row.call_share_of_oidn_fast, 3),
                       f"{row.first_ms:.0f}", _number(row.speed_up, 2))
-        limits.add_row(name, f"{row.max_error:.0e}", _percent(row.share_of_bandwidth),
-                       _percent(row.share_of_arithmetic), f"{row.peak_mb:.0f}",
-                       f"{row.bytes_a_pixel:.0f}")
+        if row.max_error is not None:
+            limits.add_row(name, f"{row.max_error:.0e}", _percent(row.share_of_bandwidth),
+                           _percent(row.share_of_arithmetic), _number(row.peak_mb, 0),
+                           _number(row.bytes_a_pixel, 0))
     console.print(speed)
     console.print(limits)
     console.print(caption(result), style="dim", highlight=False)
@@ -43,7 +44,7 @@ def _grid(title: str | None, headings: Sequence[str]) -> Table:
 
 def caption(result: Bench) -> str:
     """What the numbers stand on."""
-    yardstick = ("Open Image Denoise is not installed (pip install pyoidn)"
+    yardstick = ("Open Image Denoise is not installed (pip install mitsuba-oidn)"
                  if result.oidn_fast_ms is None else f"OIDN fast {result.oidn_fast_ms:.0f} ms")
     return (f"Medians of {result.repeats}, taking turns. ms: arrays to arrays; call: images to "
             f"images; first: compilation included. {yardstick}. Bandwidth and arithmetic: share of "

@@ -31,12 +31,13 @@ WANTED, LARGE_ENOUGH, WIDEST = 480, 640, 3960  # widths in pixels: see `contact_
 
 
 def draw_pictures(sequence: FrameSequence, scores: Scores, movie_methods: list[str] | None = None,
-                  progress: Progress = silent) -> list[str]:
+                  progress: Progress = silent, movie: bool = True) -> list[str]:
     """Write all pictures of a sequence, one frame in memory at a time.
 
     Args:
         movie_methods: methods in the movie; default: the one with the highest PSNR.
         progress: counts pictures.
+        movie: make one; else an old one stays.
     Returns:
         one sentence for each picture that could not be made.
     """
@@ -58,6 +59,8 @@ def draw_pictures(sequence: FrameSequence, scores: Scores, movie_methods: list[s
             yield picture
             progress(len(chosen) + 2 + n, total, "pictures")
 
+    if not movie:
+        return []
     names = movie_methods if movie_methods is not None else best_method(scores)
     try:
         write_movie(folder / "sequence.mp4", told(movie_pictures(sequence, scores, names)),

@@ -1,23 +1,31 @@
-"""H.264 movies, through the ffmpeg that the imageio-ffmpeg wheel brings."""
+"""H.264 movies, by PyAV: `pip install 'onespp[movie]'` brings it."""
 
 from __future__ import annotations
 
-import subprocess
+import importlib.util
 from collections.abc import Iterable
+from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
-import imageio_ffmpeg
 import numpy as np
 
+from onespp.render.errors import InputError
 from onespp.render.files.atomic import replacing
 
-# BT.709 by conversion and by tag: players guess otherwise, and tints shift.
-_COLOURS = ("scale=out_color_matrix=bt709:out_range=tv,setparams=colorspace=bt709:"
-            "color_primaries=bt709:color_trc=iec61966-2-1")
+# BT.709 by conversion and by tag: players guess otherwise, and tints shift. Numbers of ITU-T H.273.
+_BT709, _SRGB_CURVE = 1, 13
+_MISSING = "PyAV is not installed: run `pip install 'onespp[movie]'`"
 
 
 class MovieError(RuntimeError):
-    """ffmpeg is not there or gave up. The message is one sentence."""
+    """PyAV is not there or gave up. The message is one sentence."""
+
+
+def require_av() -> None:
+    """InputError where there is no PyAV to write movies with."""
+    if importlib.util.find_spec("av") is None:
+        raise InputError(f"no movie can be made: {_MISSING}, or leave out --movie")
 
 
 def write_movie(path: Path, pictures: Iterable[np.ndarray], fps: float) -> None:
@@ -31,54 +39,45 @@ def write_movie(path: Path, pictures: Iterable[np.ndarray], fps: float) -> None:
         fps: frames a second.
 
     Raises:
-        MovieError: ffmpeg is missing, cannot run, or failed.
+        MovieError: PyAV is missing, does not load, or failed.
         InputError: the folder cannot be written.
         ValueError: no picture, one of another size than the first, or of an odd one.
     """
-    process = None
     try:
-        with replacing(path) as part:
-            for picture in pictures:
-                if process is None:
-                    shape = picture.shape
-                    process = _start(part, shape[0], shape[1], fps)
-                if picture.shape != shape:
-                    raise ValueError(f"a picture is {picture.shape}, the first was {shape}")
-                _send(process, picture)
-            if process is None:
-                raise ValueError("a movie needs a picture")
-            _finish(process)
-    finally:
-        if process is not None and process.poll() is None:
-            process.kill()
-            process.communicate()
+        import av
+        from av.error import FFmpegError
+    except ModuleNotFoundError:
+        raise MovieError(_MISSING) from None
+    except ImportError as error:
+        raise MovieError(f"PyAV does not load ({error})") from None
+    shape = None
+    with replacing(path) as part:
+        try:
+            with av.open(str(part), "w", format="mp4", options={"movflags": "+faststart"}) as file:
+                for picture in pictures:
+                    if shape is None:
+                        shape = picture.shape
+                        stream = _stream(file, shape[0], shape[1], fps)
+                    if picture.shape != shape:
+                        raise ValueError(f"a picture is {picture.shape}, the first was {shape}")
+                    frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture, np.uint8))
+                    file.mux(stream.encode(frame.reformat(
+                        format="yuv420p", src_color_range="JPEG", dst_color_range="MPEG",
+                        dst_colorspace="ITU709")))
+                if shape is None:
+                    raise ValueError("a movie needs a picture")
+                file.mux(stream.encode(None))
+        except FFmpegError as error:
+            raise MovieError(f"the encoder failed ({error.strerror})") from None
 
 
-def _start(path: Path, height: int, width: int, fps: float) -> subprocess.Popen:
+def _stream(file: Any, height: int, width: int, fps: float) -> Any:
     if height % 2 or width % 2:
         raise ValueError(f"pictures are {width}x{height}; H.264 in yuv420p takes even sizes")
-    try:
-        return subprocess.Popen(
-            [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error",
-             "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:g}",
-             "-i", "-", "-vf", _COLOURS, "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20",
-             "-movflags", "+faststart", "-f", "mp4", str(path)],
-            stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    except (RuntimeError, OSError) as error:
-        raise MovieError(f"ffmpeg cannot run ({error})") from None
-
-
-def _send(process: subprocess.Popen, picture: np.ndarray) -> None:
-    assert process.stdin is not None
-    try:
-        process.stdin.write(np.ascontiguousarray(picture, np.uint8).tobytes())
-    except OSError:  # it died: say why
-        _finish(process)
-        raise MovieError("ffmpeg stopped reading") from None
-
-
-def _finish(process: subprocess.Popen) -> None:
-    _, words = process.communicate()
-    if process.returncode:
-        lines = words.decode(errors="replace").strip().splitlines() or ["no reason given"]
-        raise MovieError(f"ffmpeg failed ({lines[-1].strip()})")
+    stream = file.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001),
+                             options={"crf": "20"})
+    stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+    context = stream.codec_context
+    context.color_range = context.colorspace = context.color_primaries = _BT709
+    context.color_trc = _SRGB_CURVE
+    return stream

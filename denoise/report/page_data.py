@@ -10,7 +10,7 @@ from matplotlib import colormaps
 
 from onespp.denoise.metrics.errors import PSNR_CAP
 from onespp.denoise.metrics.metric import Metric
-from onespp.denoise.metrics.table import HEADLINE, MEASURES
+from onespp.denoise.metrics.table import HEADLINE
 from onespp.denoise.score.causes import CAUSES, HISTORIES
 from onespp.denoise.score.method_score import ClassScore, MethodScore
 from onespp.denoise.score.scorecard import INPUT, Scores, cells
@@ -20,7 +20,7 @@ from onespp.render.files.sequence import FrameSequence
 from .panels import ERROR_MAX
 from .speed_error_plot import pareto_front, times_are
 
-_SHOWN_ELSEWHERE = {"method", "ms_per_frame", "machine", *MEASURES}
+_SHOWN_ELSEWHERE = {"method", "ms_per_frame", "machine"}
 
 
 def page_data(sequence: FrameSequence, scores: Scores, channels: list[str],
@@ -33,7 +33,7 @@ def page_data(sequence: FrameSequence, scores: Scores, channels: list[str],
         histograms: method -> share of pixels in each bin between `edges`.
     """
     manifest = sequence.manifest
-    metrics = [m for m in MEASURES.values()
+    metrics = [m for m in scores.measures.values()
                if any(method[m.name] is not None for method in scores.methods.values())]
     return {
         "scene": scores.scene, "frames": scores.frames, "width": manifest.width,
@@ -111,19 +111,20 @@ def _colours(name: str) -> str:
 
 def table_data(scores: Scores) -> tuple[list[tuple[str, str]], list[tuple[str, list[str]]]]:
     """Columns (heading, what it means) and rows (method, texts) of the table of everything."""
-    rows = {name: {**cells(scores, name), **_measures(scores.methods[name]),
-                   **_rest(scores.methods[name])} for name in scores.ordered()}
+    rows = {name: {**cells(scores, name), **_measures(scores, name),
+                   **_rest(scores, name)} for name in scores.ordered()}
     headings = [h for h in dict.fromkeys(h for row in rows.values() for h in row)
                 if any(row.get(h, "-") != "-" for row in rows.values())]
-    about = {_heading(m): m.about for m in MEASURES.values()}
+    about = {_heading(m): m.about for m in scores.measures.values()}
     return ([(h, about.get(h, "")) for h in headings],
             [(name, [row.get(h, "-") for h in headings]) for name, row in rows.items()])
 
 
-def _measures(method: MethodScore) -> dict[str, str]:
+def _measures(scores: Scores, name: str) -> dict[str, str]:
+    method = scores.methods[name]
     errors = {HEADLINE.name: method.errors.get(HEADLINE.name)}  # the others' are in the files
     return {_heading(m): m.text(method[m.name], errors.get(m.name), m.name in method.bounds)
-            for m in MEASURES.values()}
+            for m in scores.measures.values()}
 
 
 def _heading(metric: Metric) -> str:
@@ -133,18 +134,18 @@ def _heading(metric: Metric) -> str:
 def best_cells(scores: Scores, columns: list[tuple[str, str]]) -> list[set[str]]:
     """For each column the text of the best value, where it is a measure of several methods."""
     best = []
-    headings = {_heading(m): m for m in MEASURES.values()}
+    headings = {_heading(m): m for m in scores.measures.values()}
     for heading, _ in columns:
         metric = headings.get(heading)
         judged = [] if metric is None else [
-            (v, method) for method in scores.methods.values()
+            (v, name) for name, method in scores.methods.items()
             if (v := method[metric.name]) is not None]
         if metric is None or len(judged) < 2:
             best.append(set())
         else:
             pick = max if metric.higher_is_better else min
-            _, method = pick(judged, key=lambda row: row[0])
-            best.append({_measures(method)[heading]})
+            _, name = pick(judged, key=lambda row: row[0])
+            best.append({_measures(scores, name)[heading]})
     return best
 
 
@@ -155,11 +156,11 @@ _NAMES = {"first_ms": "first frame (ms)", "startup_ms": "start-up (ms)",
 _SPLIT = ("bias_squared", "variance")
 
 
-def _rest(method: MethodScore) -> dict[str, str]:
+def _rest(scores: Scores, name: str) -> dict[str, str]:
     """What scores say of a method beyond the measures, one number or word each."""
-    data = method.model_dump()
+    data, shown = scores.methods[name].model_dump(), {*_SHOWN_ELSEWHERE, *scores.measures}
     plain = {key: value for key, value in data.items()
-             if key not in _SHOWN_ELSEWHERE and not isinstance(value, dict | list)}
+             if key not in shown and not isinstance(value, dict | list)}
     split = {key: value for key, value in (data.get("split") or {}).items() if key in _SPLIT}
     return {_NAMES.get(key, key.replace("_", " ")): text_of(value)
             for key, value in {**split, **plain}.items()}

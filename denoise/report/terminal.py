@@ -20,7 +20,7 @@ def print_scores(scores: Scores, console: Console | None = None) -> None:
     console.print(table(scores))
     console.print(caption(scores), style="dim", highlight=False)
     for note in scores.notes:
-        console.print(note, style="yellow", highlight=False)
+        console.print(note, style="yellow", highlight=False, markup=False)
 
 
 def table(scores: Scores) -> Table:

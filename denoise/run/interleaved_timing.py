@@ -13,7 +13,7 @@ from functools import partial
 import drjit as dr
 import numpy as np
 
-from onespp.denoise.catalog import Method, channels_read, parameters
+from onespp.denoise.catalog import Method, channels_read, parameters, source_of
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
 from onespp.render.files.json_file import format_json
@@ -73,6 +73,7 @@ def _summary(methods: Mapping[str, Method], ms: dict[str, list[float]],
         low, middle, high = np.quantile(warm, (0.25, 0.5, 0.75)).tolist()
         ratio_low, ratio, ratio_high = np.quantile(warm / base, (0.25, 0.5, 0.75)).tolist()
         found[name] = MethodTime(
-            parameters=parameters(methods[name]), first_ms=values[0], ms=middle,
-            ms_quartiles=(low, high), ratio=ratio, ratio_quartiles=(ratio_low, ratio_high))
+            parameters=parameters(methods[name]), source=source_of(methods[name]),
+            first_ms=values[0], ms=middle, ms_quartiles=(low, high), ratio=ratio,
+            ratio_quartiles=(ratio_low, ratio_high))
     return found

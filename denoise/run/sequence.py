@@ -25,6 +25,8 @@ from onespp.denoise.catalog import (
     check_not_a_method,
     name_of,
     parameters,
+    source_of,
+    versions_of,
 )
 from onespp.denoise.methods.outliers import energy_kept
 from onespp.denoise.methods.parameters import present_parameters
@@ -34,7 +36,6 @@ from onespp.render.frame import Frame
 from onespp.render.host import backend
 from onespp.render.host.machine import machine
 from onespp.render.host.timed import timed
-from onespp.render.host.versions import versions
 from onespp.render.progress import Progress, silent
 
 from .peak_memory import PeakMemory
@@ -137,8 +138,8 @@ def denoise_sequence(sequence: FrameSequence, method: Method, name: str,
     check_result_name(name, sequence.methods())
     check_not_a_method(name, name_of(method))
     run = Run(method=ran, parameters=parameters(method), changed=changed(method),
-              device=backend.choose(), threads=dr.thread_count(), versions=versions("drjit"),
-              machine=machine(backend.choose()), command=command)
+              device=backend.choose(), threads=dr.thread_count(), versions=versions_of(method),
+              machine=machine(backend.choose()), source=source_of(method), command=command)
     _remove_stale(sequence, name, run)
     frames = [i for i in sequence.frames if sequence.has_frame(i)]
     used = channels_read(method, sequence.channels)
@@ -174,7 +175,7 @@ def _remove_stale(sequence: FrameSequence, name: str, run: Run) -> None:
     """Drop results that this run would otherwise be mixed with: others', and a killed run's."""
     if name in sequence.methods():
         old = sequence.read_run(name)
-        if ((old.method, present_parameters(old.parameters), old.versions)
-                == (run.method, run.parameters, run.versions)):
+        if ((old.method, present_parameters(old.parameters), old.versions, old.source)
+                == (run.method, run.parameters, run.versions, run.source)):
             return
     sequence.remove_results(name)

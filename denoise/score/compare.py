@@ -21,24 +21,24 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal
 
 import numpy as np
-from pydantic import FiniteFloat
+from pydantic import Field, FiniteFloat
 
 from onespp.denoise.methods.parameters import present_parameters
 from onespp.denoise.metrics.means import identical
 from onespp.denoise.metrics.metric import Metric
 from onespp.denoise.metrics.table import MEASURES
+from onespp.denoise.own_method import result_name
 from onespp.render.errors import InputError
 from onespp.render.files.json_file import JsonFile, format_json
 
 from .method_score import MethodScore
-from .scorecard import Scores
+from .scorecard import OwnMetric, Scores
 
 TIME = Metric("ms", "time", lambda a, b: None, "", "ms", False, ".1f", "milliseconds a frame")
-ROWS: Mapping[str, Metric] = {**MEASURES, TIME.name: TIME}
 SIGMAS = 2.0
 DB, SHARE = 0.1, 0.02
 """What may get worse unless told otherwise: dB, and the share of a measure in another unit."""
@@ -77,11 +77,21 @@ class Change(JsonFile):
 
 
 class Comparison(JsonFile):
-    """What `onespp compare` found; notes are sentences that a reader must know."""
+    """What `onespp compare` found; notes are sentences that a reader must know.
+
+    `own_metrics` are those of `Scores` that both have.
+    """
 
     scene: str
     changes: list[Change]
     notes: list[str]
+    own_metrics: dict[str, OwnMetric] = Field(default_factory=dict)
+
+    @property
+    def measures(self) -> dict[str, Metric]:
+        """What changes may be of."""
+        return {**MEASURES, **{name: m.metric(name) for name, m in self.own_metrics.items()},
+                TIME.name: TIME}
 
     @property
     def failed(self) -> bool:
@@ -91,18 +101,22 @@ class Comparison(JsonFile):
         return format_json(self)
 
 
-def parse_thresholds(texts: tuple[str, ...]) -> dict[str, Threshold]:
-    """Thresholds of texts such as psnr_srgb=0.2 and ms=20%; InputError where one is not."""
-    found = {}
+def parse_thresholds(texts: tuple[str, ...], own: Iterable[str] = ()) -> dict[str, Threshold]:
+    """Thresholds of texts such as psnr_srgb=0.2 and ms=20%; InputError where one is not.
+
+    Args:
+        own: names of measures beside those of the table.
+    """
+    found, known = {}, (*MEASURES, *own, TIME.name)
     for text in texts:
         name, _, limit = text.partition("=")
         match = re.fullmatch(r"([0-9]+\.?[0-9]*|\.[0-9]+)(%?)", limit.strip())
         if not match:
             raise InputError(f"--threshold {text[:60]} is not understood: use NAME=LIMIT, as in "
                              "psnr_srgb=0.2 or ms=20%")
-        if name.strip() not in ROWS:
+        if name.strip() not in known:
             raise InputError(f"--threshold {text[:60]} names no measure: they are "
-                             f"{', '.join(ROWS)}")
+                             f"{', '.join(known)}")
         relative = match[2] == "%"
         if name.strip() == TIME.name and not relative:
             raise InputError(f"--threshold {text[:60]} is not a share: write it as ms=20%")
@@ -123,18 +137,23 @@ def comparison(a: Scores, b: Scores, methods: list[str] | None = None,
             raise InputError(f"the scores are not of one sequence: {key.replace('_', ' ')} is "
                              f"{old} in A and {new} in B")
     both = [name for name in a.ordered() if name in b.methods]
+    methods = None if methods is None else [result_name(name) for name in methods]
     for name in methods or ():
         if name not in both:
             raise InputError(f"the method '{name}' is not in both scores, which share "
                              f"{', '.join(both) or 'none'}")
     chosen = [name for name in both if methods is None or name in methods]
-    changes = [change for name in chosen for row in ROWS.values()
+    own = {name: b.own_metrics[name] for name, old in a.own_metrics.items()
+           if name in b.own_metrics
+           and old.higher_is_better == b.own_metrics[name].higher_is_better}
+    found = Comparison(scene=a.scene, changes=[], notes=list(_notes(a, b)), own_metrics=own)
+    changes = [change for name in chosen for row in found.measures.values()
                if (change := _change(name, row, a.methods[name], b.methods[name],
                                      thresholds or {}))]
     if not changes:
         raise InputError("the scores have no frame of a method in common: there is nothing to "
                          "compare")
-    return Comparison(scene=a.scene, changes=changes, notes=list(_notes(a, b)))
+    return found.model_copy(update={"changes": changes})
 
 
 def _change(name: str, row: Metric, a: MethodScore, b: MethodScore,
@@ -223,6 +242,11 @@ def _notes(a: Scores, b: Scores) -> Iterator[str]:
         alone = [name for name in mine.methods if name not in others.methods]
         if alone:
             yield f"Only {which} has {', '.join(alone)}."
+    for name, mine in a.own_metrics.items():
+        other = b.own_metrics.get(name)
+        if other and (mine.source, mine.higher_is_better) != (other.source,
+                                                              other.higher_is_better):
+            yield f"The metric {name} is not the same in A and B."
     for name in (n for n in a.ordered() if n in b.methods):
         for mine, which in ((a.methods[name], "A"), (b.methods[name], "B")):
             if n := len(mine.identical_frames):

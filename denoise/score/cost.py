@@ -16,7 +16,7 @@ STARTING = 3  # frames in which kernels compile: a history's are first needed in
 def cost(sequence: FrameSequence, run: Run | None, times: Times | None) -> dict[str, Any]:
     """Fields of `MethodScore` from a run; the warm median is `times`' where it has the method.
 
-    `times` count if they are of the same parameters, size and device.
+    `times` count if they are of the same parameters, file, size and device.
     """
     name, changed = (run.method, run.changed) if run else ("", {})
     run = run or Run(method="input")
@@ -25,7 +25,7 @@ def cost(sequence: FrameSequence, run: Run | None, times: Times | None) -> dict[
     measured = times.methods.get(run.method) if times else None
     interleaved = (times is not None and measured is not None
                    and present_parameters(measured.parameters)
-                   == present_parameters(run.parameters)
+                   == present_parameters(run.parameters) and measured.source == run.source
                    and (times.size, times.device) == ((width, height), run.device))
     warm = measured.ms if measured and interleaved else median(ms[1:]) if ms[1:] else None
     return {"method": name, "changed": changed, "ms_per_frame": warm,

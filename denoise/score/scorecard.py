@@ -10,18 +10,46 @@ from __future__ import annotations
 import csv
 import importlib
 import io
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field, FiniteFloat, field_validator
 
 from onespp.denoise.metrics.metric import Metric
+from onespp.denoise.metrics.own_metric import FORMAT, source_of
 from onespp.denoise.metrics.table import ESTIMATED, HEADLINE, MEASURES
+from onespp.denoise.own_method import result_name
 from onespp.render.errors import InputError
 from onespp.render.files.json_file import JsonFile, format_json, read_json
 from onespp.show.html import table_html
 
-from .method_score import INPUT, MethodScore
+from .method_score import INPUT, FrameScore, MethodScore
+
+
+class OwnMetric(JsonFile):
+    """What a metric of one's own said of itself, as `Metric` does, for who reads its values.
+
+    Attributes:
+        source: hash of the file that it was in; "" of an installed one.
+    """
+
+    label: str
+    unit: str
+    higher_is_better: bool
+    format: Annotated[str, Field(pattern=f"^{FORMAT}$")]
+    about: str
+    source: str = ""
+
+    @classmethod
+    def of(cls, row: Metric) -> OwnMetric:
+        return cls(label=row.label, unit=row.unit, higher_is_better=row.higher_is_better,
+                   format=row.format, about=row.about, source=source_of(row))
+
+    def metric(self, name: str) -> Metric:
+        """All of it but the function: its values can be read, and no others made."""
+        return Metric(name, self.label, lambda a, b: None, "", self.unit, self.higher_is_better,
+                      self.format, self.about)
 
 
 class Scores(JsonFile):
@@ -42,6 +70,7 @@ class Scores(JsonFile):
             as they were typed, in that order; those that were not recorded are missing.
         tone_map: what "srgb" means in the names of metrics.
         notes: what a reader must know, one sentence each.
+        own_metrics: name -> what is known of each metric that is not of the table.
     """
 
     scene: str
@@ -62,6 +91,7 @@ class Scores(JsonFile):
     machine: str = ""
     commands: list[str] = Field(default_factory=list)
     notes: list[str]
+    own_metrics: dict[str, OwnMetric] = Field(default_factory=dict)
     methods: dict[str, MethodScore]
 
     @field_validator("methods")
@@ -70,6 +100,11 @@ class Scores(JsonFile):
         if INPUT not in methods:
             raise ValueError(f"'{INPUT}', which methods are compared with, is missing")
         return methods
+
+    @property
+    def measures(self) -> dict[str, Metric]:
+        """Every measure that may have a value: those of the table, and the user's own."""
+        return {**MEASURES, **{name: m.metric(name) for name, m in self.own_metrics.items()}}
 
     @property
     def has_reference(self) -> bool:
@@ -89,7 +124,7 @@ class Scores(JsonFile):
     def label(self, name: str) -> str:
         """A method's name for a table, with what ran where that is something else."""
         ran = self.methods[name].method
-        return f"{name} ({ran})" if ran not in ("", name) else name
+        return f"{name} ({ran})" if ran and result_name(ran) != name else name
 
     def ordered(self) -> list[str]:
         """Names of the methods: input, then from fast to slow, then those without a time."""
@@ -124,7 +159,8 @@ class Scores(JsonFile):
         return pandas.DataFrame(self._rows())
 
     def _rows(self) -> list[dict[str, Any]]:
-        return [{"method": name, "frame": row.frame, **{m: row[m] for m in MEASURES}, "ms": row.ms,
+        measures = list(self.measures)
+        return [{"method": name, "frame": row.frame, **{m: row[m] for m in measures}, "ms": row.ms,
                  "reference_floor_db": self.reference_floor_per_frame.get(row.frame),
                  "non_finite_pixels": row.non_finite_pixels,
                  **{f"{m}_error": row.errors.get(m) for m in ESTIMATED}}
@@ -139,12 +175,23 @@ class Scores(JsonFile):
                           [caption(self), *self.notes])
 
 
+def taken_names() -> set[str]:
+    """Names that mean something else in files of scores."""
+    return {*MEASURES, *FrameScore.model_fields, *MethodScore.model_fields, "method", "frame",
+            "reference_floor_db", *(f"{m}_error" for m in ESTIMATED)}
+
+
+def check_own(metrics: Iterable[Metric]) -> None:
+    """InputError where a metric has a name that is taken."""
+    for row in metrics:
+        if row.name in taken_names():
+            raise InputError(f"scores.json has something else called '{row.name}': give the metric "
+                             "another name")
+
+
 def read_scores(path: Path) -> Scores:
     """Scores of a scores.json; InputError where it is missing or is none."""
     return read_json(path, Scores)
-
-
-_COLUMNS = [row for row in MEASURES.values() if row.in_table]
 
 
 def cells(scores: Scores, name: str) -> dict[str, str]:
@@ -153,7 +200,7 @@ def cells(scores: Scores, name: str) -> dict[str, str]:
     # (Only the headline's error is shown: the others' are in the files, and tables stay narrow.)
     row = {_heading(m): m.text(method[m.name],
                                method.errors.get(m.name) if m is HEADLINE else None,
-                               m.name in method.bounds) for m in _COLUMNS}
+                               m.name in method.bounds) for m in _columns(scores)}
     gain = None if name == INPUT else _gain(scores, method)
     row[f"gain ({HEADLINE.unit})"] = _number(gain, "+.2f")
     row["ms/frame"] = _number(method.ms_per_frame, ".1f")
@@ -177,6 +224,10 @@ def caption(scores: Scores) -> str:
             parts[-1] += (f", whose own noise caps {HEADLINE.label} at "
                           f"{scores.headline_floor:.1f} {HEADLINE.unit}")
     return "; ".join([*parts, "time: median after the first frame, without files"]) + "."
+
+
+def _columns(scores: Scores) -> list[Metric]:
+    return [row for row in scores.measures.values() if row.in_table]
 
 
 def _heading(metric: Metric) -> str:
@@ -209,7 +260,7 @@ def _difference(scores: Scores, method: MethodScore) -> float | None:
 def best(scores: Scores) -> set[tuple[str, str]]:
     """(method, heading) of the best value of each metric."""
     found = set()
-    for metric in _COLUMNS:
+    for metric in _columns(scores):
         values = {name: value for name, method in scores.methods.items()
                   if (value := method[metric.name]) is not None}
         if len(values) > 1:

@@ -70,13 +70,16 @@ class Tally:
 class MethodScorer:
     """Sees a method's frames in order.
 
+    Args:
+        own: metrics beside those of the table.
     Attributes:
         rows: what was measured. causes, histories: error by class, over frames with a frame
             before them. estimates: measure -> frame -> mean square by halves.
         headline: that of the frame seen last, with its noise; None without halves.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, own: Iterable[Metric] = ()) -> None:
+        self.own = {row.name: row for row in own}
         self.rows: list[FrameScore] = []
         self.causes, self.histories = Tally(CAUSES), Tally(HISTORIES)
         self.estimates: dict[str, dict[int, Estimate]] = {}
@@ -91,15 +94,15 @@ class MethodScorer:
             after: number of the frame before it in the sequence. image: (h, w, 3) linear radiance.
             metrics: names of those to measure.
         """
-        values: dict[str, float | None] = dict.fromkeys(MEASURES)
+        values: dict[str, float | None] = dict.fromkeys((*MEASURES, *self.own))
         errors: dict[str, float] = {}
         self.headline = None
         if ground.target is not None:
             images = pair(image, ground.target)
-            chosen = [METRICS[name] for name in metrics]
+            chosen = [self.own.get(name) or METRICS[name] for name in metrics]
             copied = images.same
             found = {} if copied else self._estimated(number, chosen, images)
-            values.update(measure_pair(images, [m.name for m in chosen if m.name not in found]))
+            values.update(measure_pair(images, [m for m in chosen if m.name not in found]))
             self.headline = found.get(HEADLINE.name)
             if self._before and self._before[0] == after:
                 old = self._before[1]

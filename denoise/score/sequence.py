@@ -8,7 +8,7 @@ too good for its reference.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from statistics import fmean
@@ -19,9 +19,11 @@ import numpy as np
 from onespp.denoise.metrics.errors import PSNR_CAP
 from onespp.denoise.metrics.estimate import BOUND, Number
 from onespp.denoise.metrics.means import identical, mean_decibels, sequence_number
+from onespp.denoise.metrics.metric import Metric
 from onespp.denoise.metrics.noise_floor import reference_floor, seen_floors
 from onespp.denoise.metrics.table import HEADLINE, MEASURES, METRICS
 from onespp.denoise.metrics.tonemap import TONE_MAP
+from onespp.denoise.own_method import result_name
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
 from onespp.render.files.frame_ranges import format_frames, spread
@@ -35,7 +37,7 @@ from .cost import cost
 from .frame_truth import FrameTruth, read_frame_truth
 from .method_score import INPUT, MethodScore
 from .paired import PairedErrors
-from .scorecard import Scores
+from .scorecard import OwnMetric, Scores, check_own
 from .scorer import MethodScorer
 
 MOST_LOST = 0.01
@@ -44,7 +46,7 @@ MOST_LOST = 0.01
 
 def score(sequence: FrameSequence, methods: list[str] | None = None,
           progress: Progress = silent, seeds: list[FrameSequence] | None = None,
-          command: str = "") -> Scores:
+          command: str = "", metrics: Sequence[Metric] = ()) -> Scores:
     """Score a sequence, and write scores.json and scores.csv into its folder.
 
     Without a reference everything but the error is reported; a method with results for some
@@ -55,14 +57,15 @@ def score(sequence: FrameSequence, methods: list[str] | None = None,
         progress: counts frames.
         seeds: renders of the same with other seeds, to split errors by (`bias_variance.py`).
         command: the command line, for scores.json.
+        metrics: to measure beside those of the table (`metrics/own_metric.py`).
 
     Raises:
-        InputError: an unknown method, no frames, a file that cannot be read or written, or
-            `seeds` that are of something else.
+        InputError: an unknown method, a metric of a name that is taken, no frames, a file that
+            cannot be read or written, or `seeds` that are of something else.
     """
     if seeds:  # before the minutes that scoring takes
         check_seeds([sequence, *seeds])
-    scores = measure_sequence(sequence, methods, progress)
+    scores = measure_sequence(sequence, methods, progress, metrics)
     if seeds:
         splits = split_errors([sequence, *seeds], list(scores.methods))
         scores = scores.model_copy(update={"methods": {
@@ -78,15 +81,16 @@ def score(sequence: FrameSequence, methods: list[str] | None = None,
 
 
 def measure_sequence(sequence: FrameSequence, methods: list[str] | None = None,
-                     progress: Progress = silent) -> Scores:
+                     progress: Progress = silent, own: Sequence[Metric] = ()) -> Scores:
     """The scores alone; arguments and errors as for `score`."""
+    check_own(own)
     names = _methods(sequence, methods)
     frames = [i for i in sequence.frames if sequence.has_frame(i)]
     if not frames:
         raise InputError(f"{sequence.folder} has no frames yet: render some first")
     runs = {name: sequence.read_run(name) for name in names}
-    scorers = {name: MethodScorer() for name in (INPUT, *names)}
-    chosen = _chosen(sequence, frames)
+    scorers = {name: MethodScorer(own) for name in (INPUT, *names)}
+    chosen = _chosen(sequence, frames, own)
     known: dict[int, _Known] = {}
     paired = PairedErrors()
     ground, after = None, {b: a for a, b in pairwise(sequence.frames)}
@@ -96,7 +100,7 @@ def measure_sequence(sequence: FrameSequence, methods: list[str] | None = None,
         ground, frame = read_frame_truth(sequence, number, here)
         if ground.reference is not None:
             known[number] = _known(sequence, number, ground, number in chosen["flip"])
-        metrics = [name for name in METRICS if number in chosen[name]]
+        metrics = [name for name in chosen if number in chosen[name]]
         seen = [INPUT]
         scorers[INPUT].see(number, before, frame["color"], ground, None, metrics)
         for name in names:
@@ -109,13 +113,14 @@ def measure_sequence(sequence: FrameSequence, methods: list[str] | None = None,
     times = read_times(sequence.folder)
     methods_scored = {name: _summary(judge, scorers[INPUT], cost(sequence, runs.get(name), times))
                       for name, judge in scorers.items()}
-    return _scores(sequence, frames, known, methods_scored, paired.errors())
+    return _scores(sequence, frames, known, methods_scored, paired.errors(), own)
 
 
-def _chosen(sequence: FrameSequence, frames: list[int]) -> dict[str, list[int]]:
+def _chosen(sequence: FrameSequence, frames: list[int],
+            own: Iterable[Metric]) -> dict[str, list[int]]:
     """Metric -> the frames that it is measured on."""
     judged = [i for i in frames if sequence.has_reference(i)]
-    return {row.name: spread(judged, row.most_frames) for row in METRICS.values()}
+    return {row.name: spread(judged, row.most_frames) for row in (*METRICS.values(), *own)}
 
 
 @dataclass(frozen=True)
@@ -135,11 +140,11 @@ def _methods(sequence: FrameSequence, wanted: list[str] | None) -> list[str]:
     if wanted is None:
         return there
     for name in wanted:
-        if name not in there and name != INPUT:
+        if result_name(name) not in there and name != INPUT:
             raise InputError(f"{sequence.folder} has no results of the method '{name}' "
                              f"(it has {', '.join(there) or 'none'}): run "
                              f"`onespp denoise {sequence.folder} --method {name}` first")
-    return [name for name in dict.fromkeys(wanted) if name != INPUT]
+    return [name for name in dict.fromkeys(map(result_name, wanted)) if name != INPUT]
 
 
 def _known(sequence: FrameSequence, number: int, ground: FrameTruth, seen: bool) -> _Known:
@@ -172,14 +177,15 @@ def _summary(judge: MethodScorer, unfiltered: MethodScorer, spent: dict[str, Any
     """`unfiltered`: the judge of the input."""
     rows = judge.rows
     numbers: dict[str, Number] = {}
-    for name, row in MEASURES.items():
+    measures = {**MEASURES, **judge.own}
+    for name, row in measures.items():
         untouched = identical(row, {r.frame: r[name] for r in unfiltered.rows})
         found = sequence_number(row, {r.frame: r[name] for r in rows},
                                 judge.estimates.get(name, {}), untouched)
         if found is not None:
             numbers[name] = found
     values: dict[str, Any] = {name: numbers[name].value if name in numbers else None
-                              for name in MEASURES}
+                              for name in measures}
     return MethodScore(
         **spent, non_finite_pixels=sum(row.non_finite_pixels for row in rows),
         identical_frames=identical(HEADLINE, {r.frame: r[HEADLINE.name] for r in rows}),
@@ -190,7 +196,8 @@ def _summary(judge: MethodScorer, unfiltered: MethodScorer, spent: dict[str, Any
 
 
 def _scores(sequence: FrameSequence, frames: list[int], known: dict[int, _Known],
-            methods: dict[str, MethodScore], paired: dict[str, dict[str, float]]) -> Scores:
+            methods: dict[str, MethodScore], paired: dict[str, dict[str, float]],
+            own: Iterable[Metric]) -> Scores:
     manifest = sequence.manifest
     floors = {frame: k.floor for frame, k in known.items() if k.floor is not None}
     return Scores(
@@ -204,7 +211,8 @@ def _scores(sequence: FrameSequence, frames: list[int], known: dict[int, _Known]
         flip_floor=_mean(k.flip_floor for k in known.values()),
         ssim_floor=_mean(k.ssim_floor for k in known.values()), paired_errors=paired,
         tone_map=TONE_MAP, versions=manifest.versions, machine=manifest.machine,
-        notes=list(_notes(manifest.frames, frames, known, methods)), methods=methods)
+        notes=list(_notes(manifest.frames, frames, known, methods)), methods=methods,
+        own_metrics={row.name: OwnMetric.of(row) for row in own})
 
 
 def _mean(values: Iterable[float | None]) -> float | None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from onespp.denoise.catalog import Method, build, channels_read, parameters
+from onespp.denoise.catalog import Method, build, channels_read, configured, parameters
 from onespp.denoise.metrics.means import mean_over_frames
 from onespp.denoise.metrics.table import MEASURES
 from onespp.denoise.score.frame_truth import read_frame_truth
@@ -37,11 +37,12 @@ def variants(name: str) -> dict[str, Method]:
     Raises:
         InputError: no such method, or none of its parameters is true or false.
     """
-    parts = {k: v for k, v in parameters(build(name)).items() if isinstance(v, bool)}
+    whole = build(name)
+    parts = {k: v for k, v in parameters(whole).items() if isinstance(v, bool)}
     if not parts:
         raise InputError(f"the method '{name}' has no parts to switch off")
-    return {WHOLE: build(name), **{f"{'without' if on else 'with'} {part}":
-                                   build(name, {part: str(not on)}) for part, on in parts.items()}}
+    return {WHOLE: whole, **{f"{'without' if on else 'with'} {part}":
+                             configured(whole, {part: str(not on)}) for part, on in parts.items()}}
 
 
 def ablate(sequence: FrameSequence, methods: dict[str, Method],

@@ -6,7 +6,7 @@ there was none before. A frame is as good as that one if its PSNR is at most `MA
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from onespp.denoise.catalog import METHODS, Method
 from onespp.denoise.metrics.errors import psnr
 from onespp.denoise.metrics.estimate import number
 from onespp.denoise.metrics.image import Pair, Target, display_error, non_finite, pair
+from onespp.denoise.own_method import OwnMethod
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.frame import Frame
@@ -71,9 +72,11 @@ class Row:
 
 
 def judge(folder: FrameSequence, scene: str, event: int | None, diffuse: bool,
-          progress: Progress = silent) -> list[Row]:
-    """Rows of the input and of every method of `METHODS`, which `progress` counts, for a rendered
-    sequence.
+          progress: Progress = silent, methods: Mapping[str, Method] | None = None) -> list[Row]:
+    """Rows of the input and of each method, which `progress` counts, for a rendered sequence.
+
+    Args:
+        methods: what to call it -> method; default every one of `METHODS`.
 
     Raises:
         InputError: a frame or a reference is missing, or a channel that a method needs.
@@ -85,25 +88,29 @@ def judge(folder: FrameSequence, scene: str, event: int | None, diffuse: bool,
     frames = [folder.read_frame(i) for i in folder.frames]
     truth = [Target(t.color, t.parts) for t in map(folder.read_reference, folder.frames)]
     rows = []
-    for done, name in enumerate((INPUT, *METHODS), 1):
-        images, alone = _denoised(name, frames)
+    judged = {name: make() for name, make in METHODS.items()} if methods is None else methods
+    for done, (name, method) in enumerate({INPUT: None, **judged}.items(), 1):
+        images, alone = _denoised(method, frames)
         psnr, yardstick = _decibels(images, truth), _decibels(alone, truth)
         energy = float(np.mean(images, dtype=np.float64)
                        / np.mean([t.linear for t in truth], dtype=np.float64))
         bad = sum(int(non_finite(image).sum()) for image in images)
         rows.append(Row(scene, name, psnr, yardstick, event, energy, bad, diffuse))
-        progress(done, len(METHODS) + 1, f"judge {scene}")
+        progress(done, len(judged) + 1, f"judge {scene}")
     return rows
 
 
-def _denoised(name: str, frames: Sequence[Frame]) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Images of a method with its history, and without."""
-    if name == INPUT:
+def _denoised(method: Method | None, frames: Sequence[Frame]
+              ) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Images of a method (None: the input) with its history, and without."""
+    if method is None:
         images = [frame["color"] for frame in frames]
         return images, images
-    method: Method = METHODS[name]()
     size = frames[0].height, frames[0].width
-    return run(method, frames, method.init(*size)), run_alone(method, frames, method.init(*size))
+    whole = run(method, frames, method.init(*size))
+    if isinstance(method, OwnMethod):  # whose state may be written to, and must be new each time
+        return whole, [method(frame, method.init(*size))[0] for frame in frames]
+    return whole, run_alone(method, frames, method.init(*size))
 
 
 def run(method: Method, frames: Iterable[Frame], state: object) -> list[np.ndarray]:

@@ -87,8 +87,12 @@ ROWS: dict[str, tuple[Callable[[Pair], float | None], str]] = {
 }
 
 
-def markdown(method: str, peer: str, scenes: dict[str, tuple[Scores, Scores]]) -> str:
-    """The table; scenes: name -> scores of plain and of our input.
+Figures = dict[str, dict[str, "float | None"]]
+"""Row of the table -> scene -> value."""
+
+
+def measure(method: str, peer: str, scenes: dict[str, tuple[Scores, Scores]]) -> Figures:
+    """The figures; scenes: name -> scores of plain and of our input.
 
     Raises:
         InputError: a folder's scores lack the method or the peer.
@@ -99,11 +103,17 @@ def markdown(method: str, peer: str, scenes: dict[str, tuple[Scores, Scores]]) -
             raise InputError(f"the scores of {name} lack '{method}': denoise by it and score")
         on_plain, on_ours = (peer_in(scores, peer, name) for scores in (plain, ours))
         pairs[name] = Pair(ours.methods[method], ours.methods[on_ours], plain.methods[on_plain])
+    return {row: {name: value(pair) for name, pair in pairs.items()}
+            for row, (value, _) in ROWS.items()}
+
+
+def markdown(method: str, peer: str, scenes: dict[str, tuple[Scores, Scores]]) -> str:
+    """The table of what `measure` finds; InputError as there."""
+    figures = measure(method, peer, scenes)
     other = "the best form of OIDN" if peer == BEST else f"`{peer}`"
-    lines = [f"| `{method}` and {other} | " + " | ".join(pairs) + " |",
-             "| --- |" + " --- |" * len(pairs)]
-    for row, (measure, form) in ROWS.items():
-        values = [measure(pair) for pair in pairs.values()]
-        cells = ["-" if v is None else format(v, form) for v in values]
+    lines = [f"| `{method}` and {other} | " + " | ".join(scenes) + " |",
+             "| --- |" + " --- |" * len(scenes)]
+    for row, values in figures.items():
+        cells = ["-" if v is None else format(v, ROWS[row][1]) for v in values.values()]
         lines.append(f"| {row} | " + " | ".join(cells) + " |")
     return "\n".join(lines)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -109,6 +109,18 @@ def class_leads(cases: Iterable[Scores], method: str,
             leads[cause] = (10 * math.log10(ratio) if ratio else -math.inf, best,
                             pixels[cause] / everything)
     return leads
+
+
+def figures(method: str, found: Mapping[Group, Mapping[str, Scores]]) -> dict[str, object]:
+    """What `markdown` shows, unrounded: cases of each group, and classes of pixels."""
+    split = [s for group, scored in found.items() if not group.plain for s in scored.values()]
+    return {
+        "method": method,
+        "groups": {group.title: [{**asdict(one), "ahead": one.ahead} for one in (
+            lead(scene, scores, method, group.peers) for scene, scores in scored.items())]
+            for group, scored in found.items()},
+        "classes": {cause: {"ahead": ahead, "peer": best, "share": share} for cause, (
+            ahead, best, share) in class_leads(split, method, OIDN_FORMS).items()}}
 
 
 def markdown(method: str, found: Mapping[Group, Mapping[str, Scores]]) -> str:

@@ -9,7 +9,7 @@ frames and seeds than those that are reported.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
@@ -17,7 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from onespp.denoise.catalog import Method, build, channels_read, parameters
+from onespp.denoise.catalog import (
+    Method,
+    channels_read,
+    configured,
+    name_of,
+    parameters,
+    source_of,
+)
 from onespp.denoise.methods.parameters import present_parameters
 from onespp.denoise.metrics.errors import psnr
 from onespp.denoise.metrics.means import mean_decibels
@@ -88,11 +95,12 @@ class Search:
         tried: settings as JSON -> dB. expected: how many trials a search without gain takes.
     """
 
-    def __init__(self, name: str, start: Settings, cases: list[Case], file: Path | None = None,
+    def __init__(self, method: Method, cases: list[Case], file: Path | None = None,
                  progress: Progress = silent) -> None:
-        self.name, self.cases, self.file, self.progress = name, cases, file, progress
+        self.method, self.cases, self.file, self.progress = method, cases, file, progress
+        self.name, self.source = name_of(method) or type(method).__name__, source_of(method)
         self.expected = 1
-        self.start = start
+        self.start = starting_point(method)
         self.tried: dict[str, float] = _read(file) if file and file.exists() else {}
 
     def run(self, names: list[str], factors: tuple[float, ...] = FACTORS
@@ -121,9 +129,10 @@ class Search:
             return None
 
     def value(self, settings: Settings) -> float:
-        key = json.dumps(settings, sort_keys=True)
+        source = {"source": self.source} if self.source else {}  # another file, other values
+        key = json.dumps({**settings, **source}, sort_keys=True)
         if key not in self.tried:
-            method = build(self.name, {k: str(v) for k, v in settings.items()})
+            method = configured(self.method, {k: str(v) for k, v in settings.items()})
             self.tried[key] = mean_psnr(method, self.cases)
             if self.file:
                 write_text(self.file, json.dumps(self.tried, indent=1) + "\n")
@@ -132,11 +141,9 @@ class Search:
         return self.tried[key]
 
 
-def starting_point(name: str, given: Mapping[str, str],
-                   note: Callable[[str], None] | None = None) -> Settings:
-    """Defaults of a method and what is given instead; `note` and InputError as of `build`."""
-    start = parameters(build(name, given, note=note))
-    return {k: v for k, v in start.items() if not isinstance(v, str)}
+def starting_point(method: Method) -> Settings:
+    """The parameters of a method that can be searched: all but texts."""
+    return {k: v for k, v in parameters(method).items() if not isinstance(v, str)}
 
 
 def _read(file: Path) -> dict[str, float]:

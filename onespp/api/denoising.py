@@ -13,6 +13,7 @@ from onespp.denoise.catalog import (
     name_of,
 )
 from onespp.denoise.methods.outliers import RemoveOutliers, WithoutOutliers
+from onespp.denoise.own_method import result_name
 from onespp.denoise.run.several import denoise_by, what_to_know
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import FrameSequence
@@ -28,8 +29,9 @@ def denoise(sequence: FrameSequence, method: str | Method[Any] = "onespp", *,
 
     Args:
         sequence: from `render` or `open`.
-        method: a name of `onespp.methods()`, or an object that denoises one frame after another
-            as `onespp.method` gives: with `needs`, `init(height, width)` and a call.
+        method: a name of `onespp.methods()`, a file of yours ("my_filter.py:MyFilter"), or an
+            object that denoises one frame after another as `onespp.method` gives: with `needs`,
+            `init(height, width)` and a call.
         name: of the results; default the method's, of an object of yours its class's.
         outliers: before the method, clamp each pixel to so many standard deviations from the mean
             of its neighbours on the same surface.
@@ -56,7 +58,7 @@ def denoise(sequence: FrameSequence, method: str | Method[Any] = "onespp", *,
                          "onespp.open(folder) gives one")
     if isinstance(method, str):
         made = build(method, _as_text(parameters), outliers)
-        called = method + (OUTLIERS if outliers is not None else "")
+        called = result_name(method) + (OUTLIERS if outliers is not None else "")
     else:
         if parameters:
             raise InputError(f"{', '.join(parameters)} can be given with a method's name only: set "

@@ -7,7 +7,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from onespp.denoise.metrics.own_metric import own_metrics
 from onespp.denoise.metrics.table import MEASURES
+from onespp.denoise.own_method import result_name
 from onespp.denoise.score.compare import (
     Comparison,
     Threshold,
@@ -25,7 +27,8 @@ from .caller import caller, public
 
 @public
 def score(sequence: FrameSequence, methods: Iterable[str] | None = None, *,
-          seeds: Iterable[FrameSequence] = (), pictures: bool = False) -> Scores:
+          metrics: Iterable[str] = (), seeds: Iterable[FrameSequence] = (),
+          pictures: bool = False, movie: bool | None = None) -> Scores:
     """Score the input and the results of methods against the references of a sequence.
 
     Errors are of display values (clipped sRGB) or of linear radiance; `onespp.metrics()` says
@@ -33,9 +36,12 @@ def score(sequence: FrameSequence, methods: Iterable[str] | None = None, *,
 
     Args:
         methods: names of results; default all that are there.
+        metrics: of your own to measure beside ours: files, as "my_metric.py:lpips_like", or names
+            of installed ones.
         seeds: renders of the same with other seeds, denoised alike: they split the error into bias
             and variance.
         pictures: also draw contact sheets, plot and movie into the folder.
+        movie: with or without the movie; None: with it where PyAV is installed.
 
     Returns:
         The scores, which are also in scores.json and scores.csv of the folder. In a notebook a
@@ -54,14 +60,21 @@ def score(sequence: FrameSequence, methods: Iterable[str] | None = None, *,
     if not isinstance(sequence, FrameSequence):
         raise InputError(f"score takes a sequence, not a {type(sequence).__name__}: "
                          "onespp.open(folder) gives one")
+    if movie:
+        from onespp.denoise.report.movie import require_av
+
+        require_av()
     names = [methods] if isinstance(methods, str) else list(methods or ())
+    own = own_metrics([metrics] if isinstance(metrics, str) else metrics)
     with writing(sequence.folder, "score"), caller().progress() as report:
-        scores = score_sequence(sequence, names or None, report, list(seeds), caller().command())
+        scores = score_sequence(sequence, names or None, report, list(seeds), caller().command(),
+                                own)
         if pictures:  # after the scores, which are on disk whatever happens here
             from onespp.denoise.report.contact_sheets import draw_pictures
 
-            trouble = draw_pictures(sequence, scores, [m for m in names if m != INPUT] or None,
-                                    report)
+            drawn = [result_name(m) for m in names if m != INPUT]
+            trouble = draw_pictures(sequence, scores, drawn or None, report,
+                                    movie=movie is not False)
             scores = scores.model_copy(update={"notes": [*scores.notes, *trouble]})
     return scores
 
@@ -91,12 +104,13 @@ def compare(a: Scores | Path | str, b: Scores | Path | str,
         >>> onespp.compare(scores, scores).failed
         False
     """
+    old, new = (scores if isinstance(scores, Scores) else read_scores(Path(scores))
+                for scores in (a, b))
+    own = {**old.own_metrics, **new.own_metrics}
     limits = {name: limit if isinstance(limit, Threshold) else
-              parse_thresholds((f"{name}={limit}",))[name]
+              parse_thresholds((f"{name}={limit}",), own)[name]
               for name, limit in (thresholds or {}).items()}
-    a, b = (scores if isinstance(scores, Scores) else read_scores(Path(scores))
-            for scores in (a, b))
-    return comparison(a, b, list(methods or ()) or None, limits)
+    return comparison(old, new, list(methods or ()) or None, limits)
 
 
 LARGEST_INLINE = 32 << 20

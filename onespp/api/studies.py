@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from onespp.denoise.catalog import METHODS
+from onespp.denoise.catalog import Method
 from onespp.denoise.studies.hard_scenes import Row, judge
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import FrameSequence
@@ -15,9 +15,9 @@ from onespp.render.progress import Progress
 from onespp.scenes.hard import HARD
 
 
-def judge_hard(name: str, folder: Path, reference_spp: int, progress: Progress,
-               tell: Callable[[str], None]) -> list[Row]:
-    """Render a hard scene into a folder, where it is missing, and try every method on it.
+def judge_hard(name: str, methods: Mapping[str, Method], folder: Path, reference_spp: int,
+               progress: Progress, tell: Callable[[str], None]) -> list[Row]:
+    """Render a hard scene into a folder, where it is missing, and try methods on it.
 
     Args:
         tell: told what to know of its references.
@@ -32,12 +32,12 @@ def judge_hard(name: str, folder: Path, reference_spp: int, progress: Progress,
     scene = hard.make()
     job = RenderJob(scene, range(scene.frames), scene.height, scene.width,
                     reference_spp=reference_spp)
-    needed = {channel for method in METHODS.values() for channel in method.needs}
+    needed = {channel for method in methods.values() for channel in method.needs}
     job = replace(job, channels=tuple(dict.fromkeys((*job.channel_names(), *sorted(needed)))))
     sequence = render_sequence(job, folder, progress=progress)
     for note in reference_notes(sequence, sequence.frames, reference_spp):
         tell(note)
-    return judge(sequence, name, hard.event, hard.diffuse, progress)
+    return judge(sequence, name, hard.event, hard.diffuse, progress, methods)
 
 
 def without_results(sequence: FrameSequence, method: str, peers: tuple[str, ...]) -> list[str]:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import click
 
 from onespp.denoise.cli.denoise import denoise_in
+from onespp.denoise.own_method import result_name
+from onespp.render.cli.figures import json_option, show_or_print
 from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.render import render_to
 from onespp.render.cli.terminal import command_line
@@ -46,51 +48,57 @@ SIZES = {"box": "256x256", "room": "320x180", "generated/": "160x108"}
               help="Samples a pixel of the suite's ground truth.")
 @click.option("--seed", type=int, default=2026, show_default=True, metavar="N",
               help="Seed of the suite's frames.")
+@json_option
 @device_option
 @threads_option
 def lead(folders: tuple[Path, ...], method: str, peer: str, suite: bool, scenes: str, out: Path,
-         size: str | None, frames: str, reference_spp: int, seed: int, device: str,
-         threads: int | None) -> None:
+         size: str | None, frames: str, reference_spp: int, seed: int,
+         json_to: str | None, device: str, threads: int | None) -> None:
     """Print how far a method is ahead of a peer, from the scores of pairs of folders."""
     if not suite:
-        _pairs(folders, method, peer)
+        _pairs(folders, result_name(method), result_name(peer), json_to)
         return
     if folders:
         raise InputError("--suite takes no folders: it renders its own into --out")
     use(device, threads)
     parse_frames(frames)
-    _suite(method, _pattern(scenes), out, size, frames, reference_spp, seed)
+    _suite(method, _pattern(scenes), out, size, frames, reference_spp, seed, json_to)
 
 
-def _pairs(folders: tuple[Path, ...], method: str, peer: str) -> None:
+def _pairs(folders: tuple[Path, ...], method: str, peer: str, json_to: str | None) -> None:
     from onespp.denoise.score.scorecard import read_scores
-    from onespp.denoise.studies.lead import markdown, peer_in, psnr_of
+    from onespp.denoise.studies.lead import markdown, measure, peer_in, psnr_of
 
     if len(folders) % 2 or not folders:
         raise InputError("folders come in pairs, of plain input and of ours: give "
                          + ("one more" if folders else "some, or --suite"))
     read = [read_scores(folder / "scores.json") for folder in folders]
     scenes = {folder.name: (a, b) for folder, a, b in zip(folders[1::2], read[::2], read[1::2])}
-    click.echo(markdown(method, peer, scenes))
-    for name, (plain, ours) in scenes.items():
-        floor = ours.headline_floor
-        on_plain, on_ours = (peer_in(scores, peer, name) for scores in (plain, ours))
-        click.echo(f"\n{name}: {len(ours.frames)} frames of {ours.size[0]}x{ours.size[1]}, "
-                   f"reference {ours.reference_spp or 'of unknown'} spp"
-                   + (" in halves" if ours.reference_halves else
-                      f", floor {floor:.1f} dB" if floor is not None else ", floor not known")
-                   + "".join(f"; {key} {psnr_of(s.methods[key]):.2f} dB{where}"
-                             for s, key, where in ((plain, "input", " (plain)"),
-                                                   (plain, on_plain, " (plain)"),
-                                                   (ours, "input", ""), (ours, on_ours, ""),
-                                                   (ours, method, ""))), nl=False)
-    click.echo()
+
+    def show() -> None:
+        click.echo(markdown(method, peer, scenes))
+        for name, (plain, ours) in scenes.items():
+            floor = ours.headline_floor
+            on_plain, on_ours = (peer_in(scores, peer, name) for scores in (plain, ours))
+            click.echo(f"\n{name}: {len(ours.frames)} frames of {ours.size[0]}x{ours.size[1]}, "
+                       f"reference {ours.reference_spp or 'of unknown'} spp"
+                       + (" in halves" if ours.reference_halves else
+                          f", floor {floor:.1f} dB" if floor is not None else ", floor not known")
+                       + "".join(f"; {key} {psnr_of(s.methods[key]):.2f} dB{where}"
+                                 for s, key, where in ((plain, "input", " (plain)"),
+                                                       (plain, on_plain, " (plain)"),
+                                                       (ours, "input", ""), (ours, on_ours, ""),
+                                                       (ours, method, ""))), nl=False)
+        click.echo()
+
+    show_or_print({"method": method, "peer": peer, "figures": measure(method, peer, scenes)},
+                  json_to, show)
 
 
 def _suite(method: str, pattern: re.Pattern[str], out: Path, size: str | None, frames: str,
-           reference_spp: int, seed: int) -> None:
+           reference_spp: int, seed: int, json_to: str | None) -> None:
     from onespp.api.studies import plain_copy
-    from onespp.denoise.studies.suite import Group, groups, markdown
+    from onespp.denoise.studies.suite import Group, figures, groups, markdown
     from onespp.scenes.catalog import GENERATED
     from onespp.scenes.generated import KEPT
     from onespp.scenes.hard import HARD
@@ -111,7 +119,8 @@ def _suite(method: str, pattern: re.Pattern[str], out: Path, size: str | None, f
                 rendered = plain_copy(rendered, out / "plain" / scene, command_line())
             scored[scene] = _scored(rendered, method, group.peers)
         found[group] = scored
-    click.echo(markdown(method, found))
+    show_or_print(figures(result_name(method), found), json_to,
+                  lambda: click.echo(markdown(result_name(method), found)))
 
 
 def _scored(sequence: FrameSequence, method: str, peers: tuple[str, ...]) -> Scores:
@@ -121,7 +130,8 @@ def _scored(sequence: FrameSequence, method: str, peers: tuple[str, ...]) -> Sco
 
     denoise_in(sequence.folder, tuple(without_results(sequence, method, peers)))
     with writing(sequence.folder, "score"):
-        return score(sequence, list(dict.fromkeys((method, *peers))), command=command_line())
+        return score(sequence, list(dict.fromkeys((result_name(method), *peers))),
+                     command=command_line())
 
 
 def _pattern(text: str) -> re.Pattern[str]:

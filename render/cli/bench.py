@@ -9,6 +9,7 @@ import click
 from onespp.render.host.memory import require_memory
 
 from .arguments import LARGEST_SIDE
+from .figures import json_option, show_or_print
 from .terminal import progress
 
 HEADER = (f"{'scene':24} {'lights':>6} {'M':>2} {'variance':>9} {'time':>6} {'better':>7}        "
@@ -21,7 +22,8 @@ HEADER = (f"{'scene':24} {'lights':>6} {'M':>2} {'variance':>9} {'time':>6} {'be
               metavar="N", help="Pixels a side.")
 @click.option("--repeats", type=click.IntRange(1, 1000), default=9, show_default=True, metavar="N",
               help="Frames that count.")
-def bench_render(scene: str, side: int, repeats: int) -> None:
+@json_option
+def bench_render(scene: str, side: int, repeats: int, json_to: str | None) -> None:
     """Time a frame of SCENE, all channels, against mi.render with `aov` around `path`.
 
     The same channels at 1 spp, in turns, after a warm-up; medians.
@@ -31,9 +33,11 @@ def bench_render(scene: str, side: int, repeats: int) -> None:
 
     ours, theirs = time_frames(scene, side, repeats)
     ratios = [b / a for a, b in zip(ours, theirs)]
-    click.echo(f"{scene} {side}x{side}: {median(ours):.0f} ms, aov around path "
-               f"{median(theirs):.0f} ms, {median(ratios):.2f} times as long "
-               f"({min(ratios):.2f} to {max(ratios):.2f})")
+    show_or_print({"scene": scene, "side": side, "ms": ours, "aov_ms": theirs,
+                   "median_ratio": median(ratios)}, json_to, lambda: click.echo(
+        f"{scene} {side}x{side}: {median(ours):.0f} ms, aov around path "
+        f"{median(theirs):.0f} ms, {median(ratios):.2f} times as long "
+        f"({min(ratios):.2f} to {max(ratios):.2f})"))
 
 
 @click.command("reference")
@@ -44,7 +48,9 @@ def bench_render(scene: str, side: int, repeats: int) -> None:
               help="Samples a pixel of every render.")
 @click.option("--repeats", type=click.IntRange(3, 1000), default=5, show_default=True, metavar="N",
               help="Renders of each, of which the median time counts.")
-def bench_reference(scenes: tuple[str, ...], pixels: int, spp: int, repeats: int) -> None:
+@json_option
+def bench_reference(scenes: tuple[str, ...], pixels: int, spp: int, repeats: int,
+                    json_to: str | None) -> None:
     """Measure references of SCENES against mi.render with `path`: error at equal time.
 
     Default all scenes but the hard ones. The same depth, pixel centres and samples, in turns, after
@@ -60,15 +66,17 @@ def bench_reference(scenes: tuple[str, ...], pixels: int, spp: int, repeats: int
     sizes = [size_of(scene, pixels) for scene in loaded]
     for height, width in sizes:
         require_memory(height, width)
-    click.echo(HEADER)
+    if json_to != "-":
+        click.echo(HEADER)
     rows = []
     with progress() as report:
         for scene, (height, width) in zip(loaded, sizes):
             row = measure(scene, height, width, spp, repeats, report)
             rows.append(row)
-            click.echo(f"{row.scene:24} {row.lights:6} {row.candidates:2} {row.variance:9.2f} "
-                       f"{row.time:6.2f} {row.better:7.2f} {f'±{row.error:.2f}':6} "
-                       f"{row.seconds:10.2f}")
+            if json_to != "-":
+                click.echo(f"{row.scene:24} {row.lights:6} {row.candidates:2} {row.variance:9.2f} "
+                           f"{row.time:6.2f} {row.better:7.2f} {f'±{row.error:.2f}':6} "
+                           f"{row.seconds:10.2f}")
     better = [row.better for row in rows]
-    if len(rows) > 1:
-        click.echo(f"median {median(better):.2f}, least {min(better):.2f}")
+    show_or_print(rows, json_to, lambda: click.echo(
+        f"median {median(better):.2f}, least {min(better):.2f}") if rows[1:] else None)

@@ -19,7 +19,7 @@ def use(device: str, threads: int | None) -> None:
 
 
 device_option = click.option("--device", default="auto", show_default=True, metavar="DEVICE",
-                             help="Where kernels run: auto, llvm (CPU) or cuda.")
+                             help="Where kernels run: auto, llvm (CPU), cuda or metal (macOS).")
 threads_option = click.option("--threads", type=int, metavar="N", help="CPU threads; default all.")
 frames_option = click.option("--frames", metavar="RANGE",
                              help="As 0:20 (0 to 19), 0:20:2, 7 or 0,5,9; default all.")

@@ -118,7 +118,8 @@ class Run(JsonFile):
     """How a denoised result came to be, in `denoised/NAME/run.json`.
 
     `method` is what ran, whatever the results are called: a name of `onespp denoise --list`,
-    `external` (the program is in `parameters`) or `files` (results taken as they were).
+    `external` (the program is in `parameters`), `files` (results taken as they were), or a file
+    of the user's, as `f.py:Name`, whose hash `source` is.
     `changed` are those of the `parameters` that are not the method's defaults.
     `ms` holds milliseconds by frame number, reading and writing of files excluded; `first_ms`
     the first call's, compilation included; `peak_mb` the most memory that the calls took, in MiB.
@@ -133,6 +134,7 @@ class Run(JsonFile):
     threads: int | None = None
     versions: dict[str, str] = Field(default_factory=dict)
     machine: str = ""
+    source: str = ""
     command: str = ""
     first_ms: FiniteFloat | None = None
     ms: dict[int, FiniteFloat] = Field(default_factory=dict)

@@ -11,9 +11,13 @@ from .json_file import JsonFile, read_json
 
 
 class MethodTime(JsonFile):
-    """Milliseconds a frame: median and quartiles, and the same of the ratio to the first method."""
+    """Milliseconds a frame: median and quartiles, and the same of the ratio to the first method.
+
+    `source` is as in `Run`.
+    """
 
     parameters: dict[str, Any]
+    source: str = ""
     first_ms: FiniteFloat
     ms: FiniteFloat
     ms_quartiles: tuple[FiniteFloat, FiniteFloat]

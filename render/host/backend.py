@@ -1,4 +1,4 @@
-"""Where kernels run: finds an LLVM that Dr.Jit can use, and picks LLVM or CUDA.
+"""Where kernels run: finds an LLVM that Dr.Jit can use, and picks LLVM, CUDA or Metal.
 
 Dr.Jit loads LLVM at run time. With LLVM 15 it aborts the whole process on the first kernel
 (an unsupported instruction), which no `except` can catch, so the version is read before Dr.Jit
@@ -22,6 +22,8 @@ from onespp.render.errors import InputError
 from .cuda_driver import has_cuda
 
 OLDEST_LLVM = 16
+VARIANTS = {"llvm": "llvm_ad_rgb", "cuda": "cuda_ad_rgb", "metal": "metal_ad_rgb"}
+"""Device -> Mitsuba's variant. (Metal, on macOS, has not been run by us.)"""
 _SET_BY_USER = os.environ.get("DRJIT_LIBLLVM_PATH") or None
 _ADVICE = ("install one with `pip install karellen-llvm-core` (Linux x86-64) or your system's "
            "package manager, or set DRJIT_LIBLLVM_PATH to a libLLVM of version 16 or newer")
@@ -154,7 +156,7 @@ def require_llvm() -> LLVM:
 
 @cache
 def choose(device: str = "auto") -> str:
-    """'cuda' or 'llvm' for 'auto', 'cuda' or 'llvm'.
+    """'cuda', 'llvm' or 'metal' for one of them or 'auto', which is CUDA where it is, else LLVM.
 
     The environment variable ONESPP_DEVICE replaces 'auto'.
 
@@ -163,8 +165,12 @@ def choose(device: str = "auto") -> str:
     """
     if device == "auto":
         device = os.environ.get("ONESPP_DEVICE", "auto")
-    if device not in ("auto", "cuda", "llvm"):
-        raise InputError(f"unknown device '{device}': use auto, llvm or cuda")
+    if device not in ("auto", *VARIANTS):
+        raise InputError(f"unknown device '{device}': use auto, llvm, cuda or metal")
+    if device == "metal":
+        if sys.platform != "darwin":
+            raise InputError(f"metal is for macOS, and this is {sys.platform}: use --device llvm")
+        return "metal"
     if device == "llvm":
         require_llvm()
         return "llvm"

@@ -13,20 +13,18 @@ import mitsuba
 from onespp.render.errors import InputError
 from onespp.render.host import backend
 
-VARIANTS = {"llvm": "llvm_ad_rgb", "cuda": "cuda_ad_rgb"}
-
 mi: Any = mitsuba  # its stubs describe no variant in particular
 
 
 def check_variant() -> None:
     """InputError where the program, or a scene's file, set a variant that renders nothing here."""
-    if mi.variant() not in VARIANTS.values():
+    if mi.variant() not in backend.VARIANTS.values():
         raise InputError(f"the Mitsuba variant is {mi.variant()}: leave out mitsuba.set_variant, "
-                         f"or set {' or '.join(VARIANTS.values())}")
+                         f"or set {' or '.join(backend.VARIANTS.values())}")
 
 
 if mi.variant() is None:
-    mi.set_variant(VARIANTS[backend.choose()])
+    mi.set_variant(backend.VARIANTS[backend.choose()])
 check_variant()
 
 __all__ = ["check_variant", "mi"]

@@ -16,7 +16,7 @@ and a signal takes the share f of it:
     h <- h + f S[e] + a (e - S[e])
 
     diffuse light, whose changes are slow        f = max(c, g)
-    glossy light                                 f = g'
+    glossy light                                 f = g',          a = max(1 / n, alpha, t)
     visibility, whose changes have sharp edges   f = max(c, g'),  a = max(1 / n, alpha, r c)
 
     s^2 <- (1 - a)^2 s^2 + a^2 s_0^2,   s_0^2 = max(W[l(e)^2] - s^2, W[l(e)^2] / 4)
@@ -24,6 +24,9 @@ and a signal takes the share f of it:
 with W the first `ENERGY_LEVELS` levels of S: unlike the variance of d in a window, that of e has
 no shadow's edge in it that stands still. Without history s_0^2 comes from what a small smoothing
 takes out of l(d): `spatial_variances`.
+
+t tells how far a mirror direction has turned (`reflections.py`); where that is by more than half a
+lobe, s_0^2 of glossy light is as without history.
 
 Visibility has two histories, where the surface was and where its shadow was: `shadow_motion.py`.
 Where the latter is taken, W is less by as much as its e^2 is, smoothed, and at least 0.
@@ -44,6 +47,7 @@ of h compares luminance too,
 
     w = h exp(-distance(q, p's plane) / (sigma_plane z(p)) - ((l(p) - l(q)) / (sigma s))^2)
 
+sigma being less for glossy light the narrower its lobe is, down to a mirror's at roughness 0,
 and its last level fades out as the history grows. A pixel of another object counts for two fifths.
 Visibility is filtered no farther than shadows are soft, and so are its e and Q: `penumbra.py`.
 Normals are not compared: where they differ much the tangent plane is soon left, and at a crease, or
@@ -63,6 +67,7 @@ import drjit as dr
 
 from onespp.denoise.filters.penumbra import footprint_falloff
 from onespp.denoise.history.records import look_up, pack_records, record_words
+from onespp.denoise.history.reflections import Lobes, turned
 from onespp.denoise.history.reprojection import Motion, ReprojectionTests, locate
 from onespp.denoise.history.shadow_motion import MIN_SHARE, look_up_shadow
 from onespp.denoise.inputs.signals import Chosen, Signal
@@ -106,7 +111,8 @@ class Innovations(NamedTuple):
         length: n, 1 without history. variances: s^2 of each signal's history.
         valid_inverse_depth: 1/z, far away without history.
         shadows: of the other history of each visibility that has one. footprint_falloffs: of
-            `penumbra.py`, of each of those. sparse: of each sparse signal.
+            `penumbra.py`, of each of those. sparse: of each sparse signal. turned: t of
+            `reflections.py`, None where the lobes of glossy light are not known.
     """
 
     signals: list[Signal]
@@ -117,18 +123,20 @@ class Innovations(NamedTuple):
     shadows: list[ShadowInnovation]
     footprint_falloffs: list[Float]
     sparse: list[SparseHistory]
+    turned: Float | None
 
 
 def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signal],
                      chosen: Chosen | None, surface: SurfaceSample, plane: TangentPlane,
                      motion: Motion, records: Float, shadows: list[Shadows],
                      tests: ReprojectionTests, max_history_length: Float,
-                     falloff_scale: Float) -> Innovations:
+                     falloff_scale: Float, lobes: Lobes | None) -> Innovations:
     """The innovation of each signal.
 
     Args:
         motion: of `motion_between`. records: of `pack_history`.
         shadows: of `follow_shadows`, smoothed. falloff_scale: of `penumbra.footprint_falloff`.
+        lobes: of `reflections.lobes_between`.
     """
     place = locate(stencil, surface, motion, tests.plane_tolerance)
     record_words_ = record_words(layout.record_values)
@@ -165,7 +173,8 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
             dr.select(moves, variance, variances[s]), dr.square(other) - energies[s]))
     return Innovations(e, energies, length, variances, valid_inverse_depth, others,
                        [footprint_falloff(shadow.penumbra, falloff_scale, MIN_SHARE)
-                        for shadow in shadows], sparse)
+                        for shadow in shadows], sparse,
+                       None if lobes is None else turned(lobes, surface.normal, place))
 
 
 def choose_histories(layout: SignalLayout, innovations: Innovations,

@@ -24,7 +24,9 @@ _FILLED = 0.5                  # samples that what was filtered counts for
 _UNKNOWN = 0.5                 # visibility that nothing is known of
 _LEAST_NOISE = 0.01            # variance of a sample of visibility
 _MOST_SAMPLES = 64.0
+LEAST_MEAN = -0.5              # of h + S[e] / S[omega]; lone rays with a small omega say anything
 _LEAST_OMEGA = 0.1             # that a lone sample is divided by
+_OTHER_IMAGE = 0.5             # lobes by which a mirror direction may turn
 _MIN_ENERGY = 1e-20            # square of a luminance that is taken for 0
 
 
@@ -61,7 +63,9 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
     omegas = weights_of(layout, chosen)
     dense = [s for s, omega in enumerate(omegas) if omega is None]
     first = [_only_sample(y, omega) for y, omega in zip(signals, omegas) if omega is not None]
-    spatial = spatial_variances(stencil, [signals[s] for s in dense], is_new, plane, first)
+    turned = innovations.turned
+    is_other = is_new if turned is None else is_new | (turned > _OTHER_IMAGE)
+    spatial = spatial_variances(stencil, [signals[s] for s in dense], is_other, plane, first)
     visible = dict(zip(layout.visibilities, smoothed.visibility_spread, strict=True))
     merged, sparse_fades = [], []
     for s, (kind, signal) in enumerate(zip(layout.kinds, signals, strict=True)):
@@ -74,14 +78,20 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
             certain = _certainty(visible[s], wide, gains)
             gain = dr.maximum(certain, gains.sharp_min_gain)
             alpha = dr.maximum(alpha, gains.change_alpha * certain)
+        elif turned is not None:  # glossy light
+            alpha = dr.maximum(alpha, turned)
         if omega is None:
             a = dr.maximum(1 / innovations.length, alpha)
             merged_signal = mapped(_merged(dr.maximum(gain, a), a), signal, e, wide)
             energy = smoothed.energies[s]
             noise = dr.maximum(energy - variance, energy * MIN_NOISE)
+            if kind is SignalKind.GLOSSY:
+                noise = dr.select(is_other, spatial[s], noise)
         else:
             g = s - len(dense)
-            old, change = innovations.sparse[g], _norm(smoothed.weights[g]) * wide.luminance
+            old = innovations.sparse[g]
+            low = dr.fma(_norm(smoothed.weights[g]), wide.luminance, old.history)
+            change = dr.clip(low, LEAST_MEAN, LARGEST_VISIBILITY) - old.history
             a = dr.minimum(dr.maximum(1 / (old.samples + old.weight + _FILLED), alpha), 1)
             v = dr.fma(gain, change, old.history)
             v = dr.fma(a, dr.fma(-old.weight, change, e.luminance), v)

@@ -21,6 +21,7 @@ import drjit as dr
 
 from onespp.denoise.filters.atrous import BACKGROUND, LARGEST_LEVELS
 from onespp.denoise.history.records import RecordState, no_history
+from onespp.denoise.history.reflections import lobes_between
 from onespp.denoise.history.reprojection import ReprojectionTests, motion_between, without_images
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
 from onespp.denoise.inputs.shadow_rays import has_shadow_rays, read_shadow_rays
@@ -42,6 +43,7 @@ from onespp.render.frame import Frame
 
 from .layout import ENERGY_LEVELS, History, SignalLayout
 from .merging import Gains
+from .output import narrowed
 from .passes import Passes
 
 _LAMP = 2 * BACKGROUND    # 1/z where albedo is 0: far from any plane, and from background
@@ -73,6 +75,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         light_sigma: falloff of the last filter with difference of luminance, of diffuse and
             glossy light [standard deviations, above 0].
         visibility_sigma: the same of visibility [standard deviations, above 0].
+        mirror_sigma: the same of what mirrors reflect, at most `light_sigma`; between the two
+            where lobes are narrow [standard deviations, above 0].
         fade_frames: history length at which the last level has faded out [frames, above 0].
         sigma_plane: falloff with distance from the tangent plane [share of depth, above 0].
         max_history_length: cap of the history length [frames, 1 to 1e6].
@@ -106,6 +110,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     sharp_output_levels: int = 3
     light_sigma: float = 8.0
     visibility_sigma: float = 6.0
+    mirror_sigma: float = 1.6
     fade_frames: float = 4.0
     sigma_plane: float = 0.005
     max_history_length: float = 64.0
@@ -129,8 +134,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         check_range(self, "noise_threshold", 0.0, 1e6)
         check_range(self, "max_history_length", 1.0, 1e6)
         check_range(self, "min_cosine", -1.0, 1.0)
-        check_positive(self, "light_sigma", "visibility_sigma", "fade_frames", "sigma_plane",
-                       "penumbra", "plane_tolerance")
+        check_positive(self, "light_sigma", "visibility_sigma", "mirror_sigma", "fade_frames",
+                       "sigma_plane", "penumbra", "plane_tolerance")
 
     @property
     def reach(self) -> int:
@@ -157,18 +162,25 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             records = no_history(stencil, layout.record_values)
         passes.layout.check(frame, layout)
         id_, chosen = stencil.Float(sample.id), light.chosen
-        evaluate(signals, sample, plane, id_, (rays, surface.position) if rays else None, chosen)
+        lobes, narrower = None, None
+        if light.roughness is not None:
+            lobes = lobes_between(previous, frame, light.roughness, surface.position, stencil)
+            narrower = narrowed(light.roughness,
+                                stencil.opaque(min(self.mirror_sigma / self.light_sigma, 1)))
+        evaluate(signals, sample, plane, id_, (rays, surface.position) if rays else None, chosen,
+                 lobes, narrower)
 
         passes.store_surface(id_, plane)
         shadows = passes.spread_shadows(rays, sample, surface.position, plane, chosen)
         innovations = passes.find_innovations(
             signals, chosen, sample, plane, motion, records, shadows,
-            *self._reprojection_parameters(stencil))
+            *self._reprojection_parameters(stencil), lobes)
         innovations = passes.choose_histories(innovations, plane)
         smoothed = passes.smooth_innovations(innovations, plane)
         merged = passes.merge(signals, innovations, chosen, smoothed, plane,
                               self._gains(stencil, layout))
-        output = passes.filter_output(merged, innovations, plane, self._sigmas(stencil, layout))
+        output = passes.filter_output(merged, innovations, plane, self._sigmas(stencil, layout),
+                                      narrower)
         records = passes.pack(sample, History(innovations.length, merged.signals),
                               output if layout.groups else None)
         return light.color(output), replace(state, passes=passes, records=records,

@@ -10,6 +10,7 @@ import drjit as dr
 
 from onespp.denoise.filters.atrous import EPSILON
 from onespp.denoise.filters.tangent_plane import BINOMIAL, SurfaceTap, surface_exponent
+from onespp.denoise.inputs.signals import SignalKind
 from onespp.denoise.inputs.surface import TangentPlane
 from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.fastmath import exp2
@@ -20,17 +21,19 @@ from .layout import NoisySignal, SignalLayout
 from .smoothing import footprint
 
 FEWEST_SAMPLES = 1e-5          # that a sparse signal's pixel counts for where it has none
+WIDE_LOBE = 0.1                # roughness: such a lobe blurs an image as far as the filter does
 _NEVER = -1e3                  # log2 of a weight that is 0
 
 
 class OutputFalloff(NamedTuple):
     """What weakens the taps of the last filter: `fade_out` of its last level, of signals that are
-    not sparse and of each that is, and `penumbra.footprint_falloff` of each visibility that shadow
-    rays tell of."""
+    not sparse and of each that is, `penumbra.footprint_falloff` of each visibility that shadow
+    rays tell of, and by what sigma of glossy light is divided, of `narrowed`."""
 
     fade: Float
     sparse_fades: list[Float]
     footprints: list[Float]
+    narrowed: Float | None
 
 
 def output_level(layout: SignalLayout, level: int, values: Taps[list[NoisySignal]],
@@ -47,6 +50,9 @@ def output_level(layout: SignalLayout, level: int, values: Taps[list[NoisySignal
     rules = [_Rule.of(layout, s, level, falloff, spacing) for s in left]
     sums = [_start(c, h0) for c in center]
     scales = [sigma / (dr.sqrt(c.variance) + EPSILON) for c, sigma in zip(center, sigmas)]
+    if falloff.narrowed is not None:
+        scales = [scale * falloff.narrowed if layout.kinds[s] is SignalKind.GLOSSY else scale
+                  for s, scale in zip(left, scales)]
     totals: list[Float] = [type(plane.dx)(h0) if c.samples is None else h0 * c.samples
                            for c in center]
     for i, offset in enumerate(window(1)):
@@ -67,6 +73,14 @@ def output_level(layout: SignalLayout, level: int, values: Taps[list[NoisySignal
     return [NoisySignal(mapped(_times(norm), noisy.signal), noisy.variance * dr.square(norm),
                         None if noisy.samples is None else total / noisy.samples)
             for noisy, norm, total in zip(sums, norms, totals)]
+
+
+def narrowed(roughness: Float, mirror: Float) -> Float:
+    """By what sigma is divided where glossy lobes are narrow, 1 from `WIDE_LOBE` on.
+
+    mirror: what a mirror's sigma is over that of diffuse light.
+    """
+    return 1 / dr.clip(roughness * (1 / WIDE_LOBE), mirror, 1)
 
 
 class _Rule(NamedTuple):

@@ -135,9 +135,10 @@ class Passes:
                              innovations.footprint_falloffs)
 
     def filter_output(self, merged: Merged, innovations: Innovations, plane: TangentPlane,
-                      sigmas: list[Float]) -> list[Signal]:
-        """The last filter of each signal."""
-        falloff = OutputFalloff(merged.fade, merged.sparse_fades, innovations.footprint_falloffs)
+                      sigmas: list[Float], narrower: Float | None) -> list[Signal]:
+        """The last filter of each signal; narrower: of `narrowed`."""
+        falloff = OutputFalloff(merged.fade, merged.sparse_fades, innovations.footprint_falloffs,
+                                narrower)
         filtered = self._through(self.output, [_counted(noisy) for noisy in merged.signals], plane,
                                  falloff, sigmas)
         return [noisy.signal for noisy in filtered]

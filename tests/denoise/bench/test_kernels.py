@@ -86,6 +86,25 @@ def test_the_table_says_where_nothing_was_counted():
     assert ["atrous", "5e-06", "25%", "12%", "2", "300"] in cells
 
 
+def test_the_calls_of_a_method_of_ones_own_stand_beside_the_kernels(clock, monkeypatch, tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text("class Mine:\n    def __call__(self, frame, state):\n"
+                    "        return frame['color'], state\n")
+    monkeypatch.setattr(kernels, "KERNELS", {"temporal": KERNELS["temporal"]})
+    arguments = ["bench", "--size", "20x12", "--repeats", "2", "--method", str(path)]
+    result = CliRunner().invoke(onespp.cli.app, [*arguments, "--json", "-"])
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)["kernels"]
+    assert list(found) == ["temporal", "mine"]
+    assert (found["mine"]["ms"], found["mine"]["call_ms"]) == (None, CALL_MS)
+    out = io.StringIO()
+    print_bench(Bench({"mine": Row(**found["mine"])}, 20, 12, 2, 100.0, 12.0, 90.0, "llvm", 2,
+                      "x86"), Console(file=out, width=100))
+    assert out.getvalue().count("mine") == 1
+    result = CliRunner().invoke(onespp.cli.app, [*arguments, "--scaling"])
+    assert "--scaling takes no --method" in str(result.exception)
+
+
 def test_scaling_has_every_kernel_at_every_size(clock):
     result = scaling(1, sizes=[(6, 9), (12, 5)])
     assert result.sizes == ["9x6", "5x12"]

@@ -50,7 +50,18 @@ def with_neighbour(frame):
                                                      frame.world_from_object[:1]]))
 
 
-def split(height, width, count=3):
+def with_lobes(frame):
+    """The frame with a roughness from 0 at its top to 1 at its bottom, and no diffuse lobe on one
+    side of it."""
+    height, width = frame["id"].shape
+    rows, columns = np.mgrid[:height, :width]
+    rough = np.maximum(0.25 * (rows * 5 // height), 0.02 * (columns % 3))
+    bare = (columns > width // 2)[..., None]
+    return with_images(frame, roughness=np.where(frame["id"] >= 0, rough, 1),
+                       albedo=np.where(bare, 1, frame["albedo"]))
+
+
+def split(height, width, count=3, lobes=True):
     """Moving frames with all channels that the method uses, a lamp, and three objects."""
     frames = []
     for i, frame in enumerate(moving(height, width, count)):
@@ -65,6 +76,7 @@ def split(height, width, count=3):
         color = frame["emission"] + direct + frame["indirect"]
         frame = with_images(frame, albedo=albedo, unshadowed=unshadowed, color=color,
                             visibility=visibility, direct=direct, specular=specular)
+        frame = with_lobes(frame) if lobes else frame
         frames.append(with_neighbour(with_shadow_rays(frame, i)))
     return frames
 
@@ -73,7 +85,7 @@ def split(height, width, count=3):
 @pytest.mark.parametrize(("height", "width", "levels", "sharp_levels"), [
     (19, 26, 4, 2), (7, 5, 4, 2), (1, 9, 4, 2), (9, 70, 7, 6), (12, 9, 6, 3)])
 def test_it_is_the_formula_in_float64(height, width, levels, sharp_levels, shadows):
-    frames = split(height, width)
+    frames = split(height, width, lobes=shadows)
     method = FilteredInnovation(
         innovation_levels=levels, output_levels=3, sharp_innovation_levels=sharp_levels,
         sharp_output_levels=2, follow_shadows=shadows)

@@ -128,8 +128,8 @@ def test_a_search_of_the_last_version_is_gone_on_with(tmp_path, monkeypatch):
     file.write_text(json.dumps({json.dumps(former(Svgf()), sort_keys=True): 31.5}))
     monkeypatch.setattr("onespp.denoise.studies.tune.mean_psnr",
                         lambda *_: pytest.fail("measured twice"))
-    search = Search("svgf", starting_point("svgf", {}), [], file)
-    assert search.value(starting_point("svgf", {})) == 31.5
+    search = Search(build("svgf"), [], file)
+    assert search.value(starting_point(build("svgf"))) == 31.5
 
 
 def test_the_command_says_it_in_one_line(call, tmp_path):

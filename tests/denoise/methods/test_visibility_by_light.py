@@ -43,9 +43,9 @@ def with_groups(frame, visible, seed):
         visibility=np.where(possible > 0, arrived / np.where(possible > 0, possible, 1), 0))
 
 
-def grouped(height, width, count=3, visible=(0.9, 0.3, 0.6)):
+def grouped(height, width, count=3, visible=(0.9, 0.3, 0.6), lobes=True):
     return [with_groups(frame, visible, 50 + i)
-            for i, frame in enumerate(split(height, width, count))]
+            for i, frame in enumerate(split(height, width, count, lobes))]
 
 
 @pytest.mark.parametrize(("height", "width", "levels", "sharp_levels", "groups", "shadows"), [
@@ -100,10 +100,33 @@ def test_a_light_that_hardly_a_ray_asked_for_keeps_its_history():
     np.testing.assert_allclose(image, lit(picks)["unshadowed0"], rtol=1e-3, atol=1e-4)
 
 
+def test_a_ray_that_was_hardly_to_be_expected_says_no_more_than_others():
+    """Lone rays to light 1 arrive where their stratum's midpoint gives nothing: omega is tiny."""
+    def lit(seed):
+        rng = np.random.default_rng(seed)
+        wall = make_frame(32, 32, wall_end=1e9)
+        u = wall["albedo"]
+        group = 1 * (rng.random((32, 32)) < 0.01)
+        omega = np.where(group == 1, 1e-3, 1.0)
+        sample = np.stack([np.ones((32, 32)), omega, np.where(group == 1, 0.05, 0.95)], -1)
+        direct = np.where((group == 1)[..., None], 20 * u, u / 0.95)
+        return with_images(wall, unshadowed=2 * u, unshadowed0=u, unshadowed1=u, group=group,
+                           group_sample=sample, direct=direct, indirect=0 * u, emission=0 * u,
+                           visibility=np.ones((32, 32)), color=direct)
+
+    frames = [lit(seed) for seed in range(8)]
+    method = FilteredInnovation()
+    state = method.init(32, 32)
+    for frame in frames:
+        image, state = method(frame, state)
+        assert image.min() >= 0
+        assert (image < 4.5 * frame["albedo"]).all()  # V is 2 at most, before this frame
+
+
 def test_energy_is_kept():
     """The mean is that of what arrives on average, not of what was picked."""
     visible = (0.9, 0.3, 0.6)
-    frames = grouped(33, 41, 6, visible)
+    frames = grouped(33, 41, 6, visible, lobes=False)
     image, _ = run(FilteredInnovation(), frames)
     last = frames[-1]
     y, _, chance = np.moveaxis(last["group_sample"], -1, 0)

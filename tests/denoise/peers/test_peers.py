@@ -20,7 +20,7 @@ from tests.support.frames import make_frame, noisy, with_images
 
 H, W = 40, 48
 
-needs_oidn = pytest.mark.skipif(not oidn.AVAILABLE, reason="pyoidn is not installed")
+needs_oidn = pytest.mark.skipif(not oidn.AVAILABLE, reason="mitsuba-oidn is not installed")
 each = pytest.mark.parametrize("name", ["oidn-fast", "oidn-split", "temporal-oidn",
                                           "temporal-oidn-split"])
 
@@ -51,7 +51,7 @@ def test_peers_have_names_of_their_own_and_build_without_what_they_need(monkeypa
 def test_without_the_package_a_sentence_says_how_to_get_it(monkeypatch):
     monkeypatch.setattr(oidn, "AVAILABLE", False)
     assert not PEERS["oidn-high"].available()
-    with pytest.raises(InputError, match=r"pip install pyoidn"):
+    with pytest.raises(InputError, match=r"pip install mitsuba-oidn"):
         build("oidn-high").init(4, 4)
 
 
@@ -66,7 +66,7 @@ def test_without_cuda_optix_says_so_in_one_line(monkeypatch):
 
 def test_no_peer_brings_in_mitsuba_before_it_is_used():
     code = ("import sys, onespp.denoise.catalog; "
-            "sys.exit('mitsuba' in sys.modules or 'pyoidn' in sys.modules)")
+            "sys.exit('mitsuba' in sys.modules or 'mitsuba_oidn' in sys.modules)")
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-import subprocess
+import sys
 
-import imageio_ffmpeg
+import av
 import numpy as np
 import pytest
 from matplotlib import colormaps
@@ -54,10 +54,9 @@ def draw(sequence, progress=silent):
 
 
 def decoded(path) -> np.ndarray:
-    """(n, h, w, 3) uint8 of a movie, by the ffmpeg that wrote it."""
-    reader = imageio_ffmpeg.read_frames(path)
-    width, height = next(reader)["size"]
-    return np.stack([np.frombuffer(f, np.uint8).reshape(height, width, 3) for f in reader])
+    """(n, h, w, 3) uint8 of a movie."""
+    with av.open(str(path)) as file:
+        return np.stack([f.to_ndarray(format="rgb24") for f in file.decode(video=0)])
 
 
 def files(folder) -> set[str]:
@@ -187,10 +186,11 @@ def test_the_movie_has_every_frame_at_the_size_and_rate_of_the_sequence(drawn):
     movie = decoded(path)
     assert movie.shape == (COUNT, *expected[0].shape)
     assert np.abs(movie[2].astype(int) - expected[2]).mean() < 6  # lossy, and half the colours
-    about = subprocess.run([imageio_ffmpeg.get_ffmpeg_exe(), "-hide_banner", "-i", str(path)],
-                           capture_output=True, text=True, check=False).stderr
-    for said in ("h264", "yuv420p", "bt709", "12 fps"):
-        assert said in about
+    with av.open(str(path)) as file:
+        about = file.streams.video[0]
+        assert (about.codec_context.name, about.codec_context.pix_fmt) == ("h264", "yuv420p")
+        assert (about.codec_context.colorspace, about.codec_context.color_primaries) == (1, 1)
+        assert (about.codec_context.color_trc, about.average_rate) == (13, 12)
 
 
 @pytest.mark.parametrize("colour", [(200, 60, 30), (20, 160, 90), (128, 128, 128)])
@@ -216,30 +216,41 @@ def test_a_method_without_a_frame_leaves_its_place_black(tmp_path):
     assert holds(shown[1], enlarged(np.zeros((HEIGHT, WIDTH, 3), np.uint8), shown[1], 3))
 
 
-def test_without_ffmpeg_there_is_one_sentence_and_all_else(tmp_path, monkeypatch):
-    def none():
-        raise RuntimeError("No ffmpeg exe could be found")
-
-    monkeypatch.setattr(onespp.denoise.report.movie.imageio_ffmpeg, "get_ffmpeg_exe", none)
+def test_without_pyav_a_sentence_says_how_to_get_it_and_all_else_is_there(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "av", None)
     sequence = make_sequence(tmp_path / "made")
     scores = draw(sequence)
-    assert [note for note in scores.notes if "no movie" in note and "\n" not in note]
+    assert [note for note in scores.notes if note == "There is no movie: PyAV is not installed: "
+            "run `pip install 'onespp[movie]'`."]
     assert "sequence.mp4" not in files(sequence.folder / "pictures")
     assert "sheet_0000.png" in files(sequence.folder / "pictures")
     assert json.loads((sequence.folder / "scores.json").read_text())["methods"]
 
 
-@pytest.mark.parametrize("script", ["#!/bin/sh\necho broken >&2\nexit 3\n",
-                                    "#!/bin/sh\ncat >/dev/null\necho broken >&2\nexit 3\n"])
-def test_an_ffmpeg_that_fails_is_named_with_its_reason(tmp_path, monkeypatch, script):
-    program = tmp_path / "ffmpeg"
-    program.write_text(script)
-    program.chmod(0o755)
-    monkeypatch.setattr(onespp.denoise.report.movie.imageio_ffmpeg, "get_ffmpeg_exe",
-                        lambda: str(program))
-    big = np.zeros((512, 512, 3), np.uint8)
+def test_a_movie_that_is_asked_for_is_refused_without_pyav_before_anything_is_scored(
+        tmp_path, monkeypatch, call):
+    sequence = make_sequence(tmp_path / "made")
+    monkeypatch.setitem(sys.modules, "av", None)
+    code, _, words = call("score", sequence.folder, "--movie")
+    assert code == 2
+    assert words == ("onespp: no movie can be made: PyAV is not installed: run `pip install "
+                     "'onespp[movie]'`, or leave out --movie\n")
+    assert not (sequence.folder / "scores.json").exists()
+
+
+def test_a_movie_that_is_not_wanted_is_not_made(tmp_path, call):
+    sequence = make_sequence(tmp_path / "made")
+    assert call("score", sequence.folder, "--no-movie")[0] == 0
+    assert "sequence.mp4" not in files(sequence.folder / "pictures")
+
+
+def test_an_encoder_that_fails_is_named_with_its_reason(tmp_path, monkeypatch):
+    def fail(*_):
+        raise av.error.InvalidDataError(1, "broken")
+
+    monkeypatch.setattr(onespp.denoise.report.movie, "_stream", fail)
     with pytest.raises(MovieError, match="broken"):
-        write_movie(tmp_path / "out/a.mp4", [big, big], 24)
+        write_movie(tmp_path / "out/a.mp4", [np.zeros((512, 512, 3), np.uint8)] * 2, 24)
     assert files(tmp_path / "out") == set()
 
 
@@ -324,3 +335,11 @@ def test_points_of_times_not_measured_in_turns_are_hollow(tmp_path, drawn):
 
     assert hollow(False, False) == hollow(True, True) == [False, False]
     assert hollow(True, False) == [False, True]
+
+
+def test_the_command_tells_how_to_get_a_movie_and_goes_on(tmp_path, monkeypatch, call):
+    monkeypatch.setitem(sys.modules, "av", None)
+    code, out, _ = call("score", make_sequence(tmp_path / "made").folder)
+    assert code == 0
+    assert ("There is no movie: PyAV is not installed: run `pip install 'onespp[movie]'`."
+            in " ".join(out.split()))

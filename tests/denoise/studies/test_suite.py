@@ -88,7 +88,7 @@ def test_the_suite_asks_for_what_it_says():
     assert by_title["hard scenes"].least == 0
 
 
-@pytest.mark.skipif(not oidn.AVAILABLE, reason="pyoidn is not installed")
+@pytest.mark.skipif(not oidn.AVAILABLE, reason="mitsuba-oidn is not installed")
 def test_one_command_renders_denoises_scores_and_goes_on_where_it_stopped(tmp_path):
     arguments = ["--suite", "--scenes", "^box$", "--out", str(tmp_path), "--size", "24x20",
                  "--frames", "0:3", "--reference-spp", "4"]

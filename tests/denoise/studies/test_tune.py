@@ -24,8 +24,8 @@ def case():
 
 
 def test_it_finds_better_parameters_than_bad_ones(case):
-    start = starting_point("atrous", {"levels": "1", "sigma_luminance": "0.1"})
-    search = Search("atrous", start, [case])
+    method = build("atrous", {"levels": "1", "sigma_luminance": "0.1"})
+    start, search = starting_point(method), Search(method, [case])
     best, value = search.run(["levels", "sigma_luminance"], factors=(2.0,))
     assert value > search.value(start) + 3
     assert best["sigma_luminance"] > 0.1
@@ -36,11 +36,10 @@ def test_it_finds_better_parameters_than_bad_ones(case):
 
 
 def test_it_goes_on_from_what_it_had_tried(case, tmp_path, monkeypatch):
-    start = starting_point("temporal", {})
     file = tmp_path / "tried.json"
-    first = Search("temporal", start, [case], file)
+    first = Search(build("temporal"), [case], file)
     result = first.run(["alpha"], factors=(2.0,))
-    again = Search("temporal", start, [case], file)
+    again = Search(build("temporal"), [case], file)
     monkeypatch.setattr("onespp.denoise.studies.tune.mean_psnr",
                         lambda *_: pytest.fail("measured twice"))
     assert again.run(["alpha"], factors=(2.0,)) == result
@@ -48,7 +47,7 @@ def test_it_goes_on_from_what_it_had_tried(case, tmp_path, monkeypatch):
 
 
 def test_what_a_method_refuses_is_not_a_candidate(case):
-    search = Search("temporal", starting_point("temporal", {}), [case])
+    search = Search(build("temporal"), [case])
     assert search.try_value({**search.start, "alpha": 2.0}) is None
     best, _ = search.run(["alpha"], factors=(8.0,))
     assert best["alpha"] <= 1

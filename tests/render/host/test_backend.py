@@ -87,8 +87,8 @@ def spoiled(tmp_path, module: str, code: str) -> str:
     ("OpenEXR", "import ctypes; ctypes.string_at(8)", "BAD   OpenEXR: crashed (SIGSEGV)"),
     ("matplotlib", "raise ImportError('no such symbol')",
      "BAD   Matplotlib: ImportError: no such symbol"),
-    ("imageio_ffmpeg", "def get_ffmpeg_exe(): raise RuntimeError('none for this platform')",
-     "note  ffmpeg: RuntimeError: none for this platform; videos are left out")])
+    ("av", "def open(*_, **__): raise RuntimeError('none for this platform')",
+     "note  PyAV: RuntimeError: none for this platform; movies are left out")])
 @pytest.mark.skipif(sys.platform == "win32", reason="no signals to die of")
 def test_doctor_survives_a_library_that_crashes_and_names_it(tmp_path, module, code, words):
     done = onespp("doctor", PYTHONPATH=spoiled(tmp_path, module, code))
@@ -112,8 +112,43 @@ def test_the_llvm_in_use_is_new_enough():
 
 
 def test_an_unknown_device_is_refused():
-    with pytest.raises(InputError, match="auto, llvm or cuda"):
+    with pytest.raises(InputError, match="auto, llvm, cuda or metal"):
         backend.choose("gpu")
+
+
+@pytest.fixture
+def afresh():
+    backend.choose.cache_clear()
+    yield
+    backend.choose.cache_clear()
+
+
+@pytest.mark.usefixtures("afresh")
+@pytest.mark.skipif(sys.platform == "darwin", reason="it is not refused there")
+def test_metal_is_refused_in_a_sentence_where_there_is_none(tmp_path):
+    done = onespp("render", "box", "--device", "metal", "--out", str(tmp_path / "a"))
+    assert done.returncode == 2
+    assert done.stderr == (f"onespp: metal is for macOS, and this is {sys.platform}: use --device "
+                           "llvm\n")
+    assert not (tmp_path / "a").exists()
+
+
+@pytest.mark.usefixtures("afresh")
+def test_metal_is_chosen_on_macos_where_it_is_asked_for_and_needs_no_llvm(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "darwin")
+    monkeypatch.setattr(backend, "find_llvm", lambda: None)
+    monkeypatch.setattr(backend, "has_cuda", lambda: False)
+    assert backend.choose("metal") == "metal"
+    monkeypatch.setenv("ONESPP_DEVICE", "metal")
+    assert backend.choose() == "metal"
+    assert backend.VARIANTS[backend.choose()] == "metal_ad_rgb"
+
+
+def test_every_device_has_a_variant_and_a_backend():
+    from onespp.denoise.jit.grid import _BACKENDS
+
+    assert {*_BACKENDS} == {*backend.VARIANTS}
+    assert len({*_BACKENDS.values()}) == len(_BACKENDS)
 
 
 @pytest.mark.parametrize(("text", "size"), [("640x360", (360, 640)), ("1x1", (1, 1)),

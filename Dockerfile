@@ -1,0 +1,3 @@
+FROM python:3.12
+COPY . /onespp
+CMD ["make", "-C", "/onespp", "demo"]
