@@ -58,8 +58,8 @@ class Method(Protocol[State]):
 
     Attributes:
         needs: channels that a frame must have. A method may also have `uses`: channels that it
-            takes where a frame has them, beside albedo and emission; and `renamed`: former name
-            of a parameter -> its name.
+            takes where a frame has them, beside albedo, emission and motion; and `renamed`: former
+            name of a parameter -> its name.
     """
 
     @property
@@ -69,8 +69,8 @@ class Method(Protocol[State]):
         """State before the first frame of a sequence of this size."""
         ...
 
-    def __call__(self, frame: Frame, state: State) -> tuple[np.ndarray, State]:
-        """(h, w, 3) float32 denoised radiance, and the state for the next frame."""
+    def __call__(self, frame: Frame, state: State | None) -> tuple[np.ndarray, State]:
+        """(h, w, 3) float32 denoised radiance, and the state for the next frame; None begins."""
         ...
 
 
@@ -178,16 +178,18 @@ def _warn(text: str) -> None:
 
 def channels_read(method: Method, there: Iterable[str]) -> tuple[str, ...]:
     """Channels that a method reads of a frame that has those in `there`, what it needs first."""
-    optional = {*TEXTURE, *getattr(method, "uses", ())}
+    optional = {*TEXTURE, "motion", *getattr(method, "uses", ())}
     return tuple(dict.fromkeys((*method.needs, *(c for c in there if c in optional))))
 
 
 def parameters(method: Any) -> dict[str, bool | int | float | str]:
-    """Parameter name -> value, those of a method's parts included."""
+    """Parameter name -> value, those of a method's parts included; of an object that is no
+    dataclass its plain attributes."""
     if isinstance(method, OwnMethod):
         return method.parameters()
     if not is_dataclass(method):
-        return {}
+        return {key: value for key, value in getattr(method, "__dict__", {}).items()
+                if isinstance(value, bool | int | float | str) and not key.startswith("_")}
     found: dict[str, bool | int | float | str] = {}
     for f in fields(method):
         value = getattr(method, f.name)
@@ -260,3 +262,10 @@ PEERS: Mapping[str, Peer] = MappingProxyType({
     "optix-temporal": Peer(partial(Optix, temporal=True), _has_cuda,
                            "NVIDIA's OptiX denoiser with its last result."),
 })
+
+
+def described() -> dict[str, str]:
+    """Name -> what it is, in a line, of every method and peer."""
+    about = {name: (method.__doc__ or "").splitlines()[0] for name, method in METHODS.items()}
+    return about | {name: peer.about + ("" if peer.available() else " Not available here.")
+                    for name, peer in PEERS.items()}

@@ -20,6 +20,7 @@ from typing import Any
 import click
 from draw_architecture import imports, modules, rooms, rooms_table, svg
 
+import onespp
 from onespp.cli import app
 from onespp.denoise.catalog import METHODS, PEERS, build
 from onespp.denoise.methods.outliers import RemoveOutliers
@@ -216,6 +217,38 @@ def commands() -> str:
     return "\n\n".join(sections)
 
 
+def library() -> str:
+    """The functions of `import onespp`, and frames of arrays, as their docstrings have them."""
+    functions = {name: found for name in sorted(onespp.__all__)
+                 if not isinstance(found := _function(name), type)}
+    functions["Frame.from_arrays"] = onespp.Frame.from_arrays
+    return "\n\n".join(_function_section(name, f) for name, f in functions.items())
+
+
+def _function(name: str) -> Any:
+    found = getattr(onespp, name)  # packages that are functions, too
+    return onespp._public(name) if inspect.ismodule(found) else found
+
+
+def _function_section(name: str, function: Callable[..., Any]) -> str:
+    """Name, signature, and the docstring: its sections as they stand, its example apart."""
+    text, _, example = inspect.cleandoc(function.__doc__ or "").partition("Example:\n")
+    about, _, details = text.partition("\n\n")
+    signature = re.sub(r"(: |-> )'([^']*)'", r"\1\2", str(inspect.signature(function)))
+    return "\n\n".join([
+        f"### `onespp.{name}`", f"```text\n{name}{_broken(signature)}\n```", about,
+        *([f"```text\n{details.strip()}\n```"] if details.strip() else []),
+        f"```pycon\n{inspect.cleandoc(example).strip()}\n```"])
+
+
+def _broken(signature: str) -> str:
+    """A long signature with a parameter a line."""
+    if len(signature) < 80:
+        return signature
+    inside, _, result = signature[1:].rpartition(")")
+    return "(\n    " + re.sub(r", (?=\*?\*?\w+(?::|,|$)|\*,)", ",\n    ", inside) + f"){result}"
+
+
 def walk(group: click.Group, before: str = "") -> list[tuple[str, click.Command]]:
     """(path of names, command) of all commands below a group."""
     found: list[tuple[str, click.Command]] = []
@@ -236,7 +269,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "architecture": architecture, "rooms": lambda: rooms_table(rooms()),
     "method-list": method_list, "methods": methods, "shared": shared, "peers": peers,
     "channels": channels, "metrics": metrics, "causes": causes, "histories": histories,
-    "scenes": scenes, "hard-scenes": hard_scenes, "commands": commands,
+    "library": library, "scenes": scenes, "hard-scenes": hard_scenes, "commands": commands,
 }
 
 

@@ -32,7 +32,8 @@ from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.denoise.report.speed_error_plot import plot_speed_against_error
 from onespp.denoise.run.interleaved_timing import time_methods
 from onespp.denoise.run.sequence import denoise_sequence
-from onespp.denoise.score.scorecard import INPUT, MethodScore, Scores
+from onespp.denoise.score.method_score import INPUT, MethodScore
+from onespp.denoise.score.scorecard import Scores
 from onespp.denoise.score.sequence import score
 from onespp.denoise.studies import hard_scenes as hard_study
 from onespp.denoise.studies.ablation import ablate, variants

@@ -11,6 +11,10 @@ from dataclasses import dataclass
 from enum import Enum
 from types import MappingProxyType
 
+from onespp.show.pictures import Display
+
+from .errors import InputError
+
 
 class Stored(Enum):
     """The type in the file. In memory all is float32, but for object IDs, which are int32."""
@@ -34,17 +38,8 @@ class Group(Enum):
     GROUPED = "direct light by groups of lights, of scenes that have several"
     GLOSS = "reflections, of scenes that have glossy surfaces"
     REPLAY = "samples of the last frame, shaded again"
+    MOTION = "of imports alone, whose motion no matrices tell"
     TRUTH = "of references alone"
-
-
-class Display(Enum):
-    """How a picture shows a channel."""
-
-    LIGHT = "tone-mapped, as radiance"
-    AXES = "components of a unit vector, -1 to 1"
-    RANGE = "from its least to its greatest value"
-    UNIT = "0 to 1"
-    OBJECT = "a colour for each object"
 
 
 @dataclass(frozen=True)
@@ -149,6 +144,9 @@ _ROWS = (
     Channel("replay_before", Group.REPLAY, ("before.direct", "before.indirect"), FLOAT,
             Display.UNIT, -1.0,
             "luminance that the same samples had in that frame; -1: no sample"),
+    Channel("motion", Group.MOTION, ("motion.X", "motion.Y"), EXACT, Display.RANGE, 0.0,
+            "from a pixel's centre to where its surface was on the screen of the frame before, "
+            "pixels, x to the right and y down; not finite: unknown"),
     Channel("variance", Group.TRUTH, _rgb("variance"), EXACT, Display.LIGHT, 0.0,
             "variance of the mean that `color` holds, radiance^2 (older references only)"),
     Channel("half", Group.TRUTH, _rgb("half"), HALF, Display.LIGHT, 0.0,
@@ -179,10 +177,33 @@ RADIANCE, SPLIT, SHADOW, GROUPED, GLOSS, REPLAY = (channels_of(group) for group 
 UNSHADOWED = tuple(name for name in GROUPED if name.startswith("unshadowed"))
 FRAME = channels_of(Group.RADIANCE, Group.GUIDES)
 """What can be said of every scene."""
-OFFERED = channels_of(*(group for group in Group if group is not Group.TRUTH))
-"""What a frame can carry."""
+OFFERED = channels_of(*(group for group in Group if group not in (Group.TRUTH, Group.MOTION)))
+"""What a rendered frame can carry."""
 TRAINING = tuple(name for name in OFFERED if name not in (
     "color", "position", "hit_distance", "hit_id", *REPLAY))
 """What methods and training read, without what follows from it (`render/derived.py`)."""
 REFERENCE = ("color", "half", "quarter0", "quarter1")
 """What the file of a reference has."""
+
+
+def asked_channels(text: str | None) -> tuple[tuple[str, ...] | None, tuple[str, ...]]:
+    """The channels that `--channels` asks for, None for the default ones, and those to add.
+
+    Raises:
+        InputError: a name that is not in `OFFERED`, or none.
+
+    Example:
+        >>> asked_channels("id,color"), asked_channels("+gradient")
+        ((('color', 'id'), ()), (None, ('replay', 'replay_before')))
+    """
+    if text is None or text == "training":
+        return None, ()
+    added = text.startswith("+")
+    names = [name.strip() for name in text[added:].split(",") if name.strip()]
+    names = [n for name in names for n in (REPLAY if name == "gradient" else (name,))]
+    unknown = [name for name in names if name not in OFFERED]
+    if unknown or not names:
+        raise InputError(f"--channels names {unknown[0] if unknown else 'nothing'}: "
+                         f"use some of {', '.join(OFFERED)}")
+    chosen = tuple(name for name in OFFERED if name in names)
+    return (None, chosen) if added else (chosen, ())

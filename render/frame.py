@@ -11,14 +11,20 @@ is the camera-space depth.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from onespp.show.html import Shown, frame_html
+
 from .channels import CHANNELS
 from .errors import InputError
+from .guides_camera import camera_of_guides
+
+LARGEST_ID = 1 << 16
+"""Of objects without matrices, each of which gets one."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +78,59 @@ class Frame:
             object.__setattr__(self, name, matrix)
         object.__setattr__(self, "images", MappingProxyType(dict(self.images)))
 
+    @classmethod
+    def from_arrays(cls, *, color: Any, normal: Any = None, depth: Any = None, motion: Any = None,
+                    id: Any = None, index: int = 0, camera_from_world: Any = None,
+                    screen_from_world: Any = None, world_from_object: Any = None,
+                    **channels: Any) -> Frame:
+        """A frame of plain arrays, as another renderer gives them.
+
+        Args:
+            color: (h, w, 3) linear Rec. 709 radiance.
+            normal: (h, w, 3) unit normals that face the camera; in world space, or in any other
+                whose axes stay as they are from frame to frame.
+            depth: (h, w) camera-space z, not the distance along the ray; 0, negative or not
+                finite where there is nothing.
+            motion: (h, w, 2) pixels from a pixel's centre to where its surface was in the frame
+                before, x to the right and y down. It is believed where matrices say otherwise.
+                None, without matrices: surfaces stay where they are on the screen.
+            id: (h, w) object IDs from 0 on, -1 for none; default one object where there is depth.
+            index: the frame's number.
+            camera_from_world, screen_from_world: (4, 4), see the class. Both None: a camera that
+                fits depth and normals (`guides_camera.py`).
+            world_from_object: (n, 4, 4) by ID; default objects at rest.
+            **channels: others of the channel table, as `albedo`.
+
+        Raises:
+            InputError: an unknown channel, shapes that disagree, or one matrix without the other.
+
+        Example:
+            >>> frame = Frame.from_arrays(color=np.ones((12, 16, 3)), depth=np.full((12, 16), 2.0),
+            ...                           normal=np.tile([0.0, 0.0, -1.0], (12, 16, 1)))
+            >>> list(frame.images), frame["color"].dtype
+            (['color', 'normal', 'depth', 'id', 'motion'], dtype('float32'))
+        """
+        if (camera_from_world is None) != (screen_from_world is None):
+            raise InputError(f"frame {index} has one of camera_from_world and screen_from_world: "
+                             "give both, or neither")
+        given = {"color": color, "normal": normal, "depth": depth, "motion": motion, "id": id,
+                 **channels}
+        images = {name: _typed(name, image, index) for name, image in given.items()
+                  if image is not None}
+        size = images["color"].shape[:2] if images["color"].ndim == 3 else (1, 1)
+        if "id" not in images:
+            there = images.get("depth", np.ones(size, np.float32))
+            images["id"] = np.where(np.isfinite(there) & (there > 0), 0, -1).astype(np.int32)
+        if camera_from_world is None:
+            images.setdefault("motion", np.zeros((*size, 2), np.float32))
+        if world_from_object is None:
+            world_from_object = _at_rest(images["id"], index)
+        if camera_from_world is not None:
+            return cls(index, images, camera_from_world, screen_from_world, world_from_object)
+        checked = cls(index, images, np.eye(4), np.eye(4), world_from_object)
+        camera, screen = camera_of_guides(images.get("depth"), images.get("normal"), size)
+        return replace(checked, camera_from_world=camera, screen_from_world=screen)
+
     @property
     def height(self) -> int:
         return next(iter(self.images.values())).shape[0]
@@ -79,6 +138,12 @@ class Frame:
     @property
     def width(self) -> int:
         return next(iter(self.images.values())).shape[1]
+
+    def _repr_html_(self) -> str:
+        """Its colour and all channels, for a notebook."""
+        shown = {name: Shown(image, CHANNELS[name].display, CHANNELS[name].about)
+                 for name, image in self.images.items()}
+        return frame_html(self.index, shown)
 
     def __contains__(self, channel: str) -> bool:
         return channel in self.images
@@ -90,6 +155,25 @@ class Frame:
                 f"frame {self.index} lacks the channel '{channel}' "
                 f"(it has {', '.join(self.images)})")
         return self.images[channel]
+
+
+def _typed(name: str, image: Any, index: int) -> np.ndarray:
+    """An image of numbers as float32, of object IDs as int32 if that loses nothing."""
+    array = np.asarray(image)
+    if name not in CHANNELS or array.dtype.kind not in "fiu":
+        return array  # refused later, in words
+    if not CHANNELS[name].is_id:
+        return array.astype(np.float32)
+    return array.astype(np.int32) if array.size and _is_whole(array) else array
+
+
+def _at_rest(ids: np.ndarray, index: int) -> np.ndarray:
+    """A matrix for each object ID that there is."""
+    most = int(ids.max()) if ids.size and ids.dtype == np.int32 else 0
+    if most > LARGEST_ID:
+        raise InputError(f"frame {index} has the object ID {most}: number objects from 0 on, to "
+                         f"{LARGEST_ID} at most")
+    return np.tile(np.eye(4), (max(most, 0) + 1, 1, 1))
 
 
 def _check_type(image: Any, kinds: str, what: str) -> None:

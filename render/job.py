@@ -14,6 +14,7 @@ from onespp.render.files.json_file import checked
 from onespp.render.files.manifest import Manifest, first_difference
 from onespp.render.files.sequence import FrameSequence, another
 from onespp.render.host.machine import machine
+from onespp.render.host.turns import turn
 from onespp.render.host.versions import versions
 from onespp.render.progress import Progress, silent
 from onespp.render.reference_error import FEWEST_SPP
@@ -64,6 +65,7 @@ class RenderJob:
     reference_error: float | None = None
 
     @cached_property
+    @turn()
     def renderer(self) -> Renderer:
         return Renderer(self.scene, self.height, self.width, direct=self.direct,
                         sampler=self.sampler)

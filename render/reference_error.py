@@ -30,7 +30,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .srgb import srgb_from_linear
+from onespp.show.srgb import srgb_from_linear
 
 MSE = 1e-4  # of a method of 40 dB
 FEWEST_SPP = 64  # below, what bends the halves on sRGB is no small correction any more

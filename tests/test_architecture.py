@@ -20,6 +20,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ROOMS = (
     "onespp.__main__", "onespp.cli", "onespp.templates", "onespp.denoise.cli", "onespp.render.cli",
+    "onespp", "onespp.api",
     "onespp.denoise.report", "onespp.denoise.bench", "onespp.denoise.studies",
     "onespp.denoise.run", "onespp.denoise.score",
     "onespp.denoise.catalog", "onespp.denoise.peers",
@@ -31,12 +32,13 @@ ROOMS = (
     "onespp.render.references", "onespp.render.study", "onespp.render.tracer",
     "onespp.render.mitsuba", "onespp.render.games202",
     "onespp.render", "onespp.render.files", "onespp.render.host",
-    "onespp.render.derived", "onespp.render.frame", "onespp.render.channels",
+    "onespp.render.derived", "onespp.render.frame", "onespp.render.guides_camera",
+    "onespp.render.channels",
     "onespp.render.progress",
     "onespp.render.errors",
     "onespp.scenes.catalog", "onespp.scenes.generated", "onespp.scenes.hard", "onespp.scenes.room",
     "onespp.scenes",
-    "onespp",
+    "onespp.show",
     "onespp.entry_points", "onespp.user_code",
 )
 MOST_FILES = 12
@@ -52,6 +54,8 @@ NEVER = {  # module -> what it never imports
     r"^onespp\.render\.(files|frame|channels|errors)(\.|$)": r"^(drjit|mitsuba)",
     r"^onespp\.denoise(\.|$)": r"^onespp\.(scenes|render\.(tracer|mitsuba))(\.|$)",
     r"^onespp\.render(\.|$)": r"^onespp\.denoise(\.|$)",
+    # a command parses, calls and prints: images and kernels are below it
+    r"^onespp\.(\w+\.)?cli(\.|$)": r"^(numpy|drjit|mitsuba|onespp\.render\.(tracer|mitsuba))(\.|$)",
     r"^onespp\.scenes(\.|$)": r"^(onespp\.(render|denoise)|drjit|mitsuba)(\.|$)",
 }
 
@@ -138,6 +142,9 @@ def test_the_rules_hold():
     ("onespp.denoise.run.sequence", "from onespp.render.tracer import path", "imports"),
     ("onespp.denoise.methods.svgf", "import mitsuba as mi", "imports mitsuba"),
     ("onespp.scenes.box", "import onespp.render.frame", "imports onespp.render"),
+    ("onespp.cli.hard", "import numpy as np", "imports numpy"),
+    ("onespp.show.png", "from onespp.render import channels", "up from"),
+    ("onespp.api.caller", "import onespp.cli", "up from"),
 ])
 def test_a_broken_rule_is_noticed(module: str, line: str, complaint: str):
     modules = sources()
@@ -146,7 +153,7 @@ def test_a_broken_rule_is_noticed(module: str, line: str, complaint: str):
 
 
 def test_a_folder_holds_3_to_12_files():
-    folders = {path.parent for top in ("scenes", "render", "denoise")
+    folders = {path.parent for top in ("scenes", "render", "denoise", "onespp/api", "onespp/show")
                for path in (ROOT / top).rglob("*.py")}
     sizes = {str(folder.relative_to(ROOT)): len([
         p for p in folder.iterdir() if p.suffix == ".py" and p.stem != "__init__"])

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import click
 
+from onespp.api import scoring as api
+
 from .options import json_option, show_or_print
 
 
@@ -27,12 +29,12 @@ def compare(a: Path, b: Path, methods: tuple[str, ...], thresholds: tuple[str, .
     Change by change, with its standard error over the frames that both have.
     """
     from onespp.denoise.report.comparison import print_comparison
-    from onespp.denoise.score.compare import comparison, parse_thresholds
+    from onespp.denoise.score.compare import parse_thresholds
     from onespp.denoise.score.scorecard import read_scores
 
     old, new = read_scores(a), read_scores(b)
-    found = comparison(old, new, list(methods) or None,
-                       parse_thresholds(thresholds, {**old.own_metrics, **new.own_metrics}))
+    found = api.compare(old, new, methods, parse_thresholds(
+        thresholds, {**old.own_metrics, **new.own_metrics}))
     show_or_print(found.json_text(), json_to, lambda: print_comparison(found, show_all))
     if found.failed:
         sys.exit(1)

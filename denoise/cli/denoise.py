@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from functools import partial
-from itertools import pairwise
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,21 +11,17 @@ from click.core import ParameterSource
 
 from onespp.denoise.methods.parameters import pairs
 from onespp.denoise.own_method import result_name
-from onespp.render.channels import REPLAY, SPLIT
 from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import command_line, note, progress
 from onespp.render.errors import InputError
 from onespp.render.files.lock import writing
 from onespp.render.files.manifest import check_result_name
 from onespp.render.files.sequence import FrameSequence
-from onespp.render.games202.layout import gaps
 
 if TYPE_CHECKING:
     from onespp.denoise.catalog import Method
 
 DEFAULT_METHODS = ("onespp",)
-BETTER_ON_PLAIN = ("temporal-oidn", "oidn-high")
-"""On most frames without visibility apart, as imported ones: up to 4 dB, if not on all."""
 
 
 @click.command()
@@ -71,7 +65,7 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
                default: bool = False) -> None:
     """Do what the options of `denoise` ask; `default`: nobody chose the methods."""
     from onespp.denoise.catalog import OUTLIERS
-    from onespp.denoise.run.sequence import denoise_sequence
+    from onespp.denoise.run.several import denoise_by, what_to_know
 
     sequence = FrameSequence.open(folder)
     chosen = method_names(methods)
@@ -79,25 +73,18 @@ def denoise_in(folder: Path, methods: tuple[str, ...], settings: tuple[str, ...]
         raise InputError(f"--name {name} is one name for {len(chosen)} methods: give one --method")
     denoisers = {made + (OUTLIERS if outliers is not None else "") if name is None else name: method
                  for made, method in built(chosen, pairs(settings), outliers).items()}
-    for name, denoiser in denoisers.items():
-        _check_replay(name, denoiser.needs, sequence.channels, str(folder))
-    frames = sum(map(sequence.has_frame, sequence.frames))
-    if not frames:
-        raise InputError(f"{folder} has no frames yet: render some first")
-    paces, runs = {}, {}
     with progress() as report:
-        for name, denoiser in denoisers.items():
-            with writing(folder, f"denoise-{name}"):
-                runs[name] = denoise_sequence(sequence, denoiser, name, report,
-                                              partial(paces.__setitem__, name), command_line())
-    for name, pace in paces.items():
-        click.echo(f"{name}: {pace}")
-    for name, run in runs.items():
+        done = denoise_by(sequence, denoisers, report, command_line())
+    for name, (_, pace) in done.items():
+        if pace is not None:
+            click.echo(f"{name}: {pace}")
+    for name, (run, _) in done.items():
         if run.energy_kept is not None:
             click.echo(f"{name}: removing outliers took {1 - run.energy_kept:.2%} of the energy")
-    for line in _what_to_know(sequence, default):
+    for line in what_to_know(sequence, default):
         click.echo(line)
-    click.echo(f"denoised {frames} frames by {', '.join(runs)} "
+    frames = sum(map(sequence.has_frame, sequence.frames))
+    click.echo(f"denoised {frames} frames by {', '.join(done)} "
                f"into {sequence.folder / 'denoised'}")
 
 
@@ -105,11 +92,12 @@ def check_methods(methods: tuple[str, ...], channels: tuple[str, ...]) -> None:
     """InputError for methods that `denoise_in` would refuse for frames with these channels asked
     for: said before hours of rendering."""
     from onespp.denoise.catalog import check_not_a_method, name_of
+    from onespp.denoise.run.several import check_replay
 
     for name, method in built(method_names(methods)).items():
         check_result_name(name)
         check_not_a_method(name, name_of(method))
-        _check_replay(name, method.needs, channels, "this run")
+        check_replay(name, method.needs, channels, "this run")
 
 
 def built(methods: Iterable[str], settings: Mapping[str, str] | None = None,
@@ -125,34 +113,6 @@ def built(methods: Iterable[str], settings: Mapping[str, str] | None = None,
                              f"one of them after the other, {name} with a --name of its own")
         found[called] = build(name, settings, outliers, note)
     return found
-
-
-def _check_replay(name: str, needs: Iterable[str], channels: Iterable[str], who: str) -> None:
-    if set(REPLAY) & set(needs) - set(channels):
-        raise InputError(f"{name} needs the channels {' and '.join(REPLAY)}, which {who} "
-                         "lacks: render it with --channels +gradient")
-
-
-def _what_to_know(sequence: FrameSequence, default: bool) -> Iterator[str]:
-    """What a user may not know of these frames, a sentence each; `default`: of the method, too."""
-    if default and not set(SPLIT) <= set(sequence.channels):
-        from onespp.denoise.catalog import PEERS
-
-        install = "" if all(PEERS[name].available() for name in BETTER_ON_PLAIN) else (
-            ", with Open Image Denoise installed (pip install 'onespp[oidn]')")
-        yield (f"these frames lack {' and '.join(SPLIT)}, on which the default method builds: "
-               f"without them --method {' or '.join(BETTER_ON_PLAIN)} is often better{install}")
-    for a, b in _gaps(sequence):
-        yield (f"there is no frame between {a} and {b}: methods with a history took {b} for the "
-               f"frame after {a}")
-
-
-def _gaps(sequence: FrameSequence) -> list[tuple[int, int]]:
-    """Neighbours between which frames are missing; a stride that was asked for misses none."""
-    there = [i for i in sequence.frames if sequence.has_frame(i)]
-    known = gaps(there) if sequence.manifest.source == "games202" else []
-    return [(a, b) for a, b in pairwise(there)
-            if (a, b) in known or any(a < i < b for i in sequence.frames)]
 
 
 def _denoise_externally(folder: Path, command: str, name: str) -> None:
@@ -176,12 +136,10 @@ def method_names(methods: tuple[str, ...]) -> list[str]:
 
 
 def _list(context: click.Context) -> None:
-    from onespp.denoise.catalog import METHODS, PEERS, build, parameters
+    from onespp.denoise.catalog import build, described, parameters
     from onespp.denoise.own_method import about_own, offers
 
-    about = {name: (method.__doc__ or "").splitlines()[0] for name, method in METHODS.items()}
-    about.update({name: peer.about + ("" if peer.available() else " Not available here.")
-                  for name, peer in PEERS.items()})
+    about = described()
     for name, line in about.items():
         click.echo(f"{name}: {line}")
         click.echo("    " + ", ".join(f"{k}={v}" for k, v in parameters(build(name)).items()))

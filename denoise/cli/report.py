@@ -6,8 +6,7 @@ from pathlib import Path
 
 import click
 
-from onespp.render.cli.terminal import command_line, progress
-from onespp.render.files.lock import writing
+from onespp.api import scoring as api
 from onespp.render.files.sequence import FrameSequence
 
 from .score import score_in
@@ -19,14 +18,9 @@ from .score import score_in
               help="Of the frames, as albedo,normal; default all. Fewer make a smaller folder.")
 def report(folder: Path, channels: str | None) -> None:
     """Write a report of the scored sequence in FOLDER that opens in any browser."""
-    from onespp.denoise.report.html import write_report
-    from onespp.denoise.score.scorecard import read_scores
-
     sequence = FrameSequence.open(folder)
     if not (folder / "scores.json").exists():
         score_in(folder)
     names = channels and [name.strip() for name in channels.split(",") if name.strip()]
-    with writing(folder, "report"), progress() as tell:
-        page = write_report(sequence, read_scores(folder / "scores.json"), names or None, tell,
-                            command_line())
+    page = api.report(sequence, names or None).path
     click.echo(f"wrote {page}: open it in a browser")

@@ -6,10 +6,7 @@ from pathlib import Path
 
 import click
 
-from onespp.denoise.own_method import result_name
-from onespp.denoise.score.scorecard import INPUT
-from onespp.render.cli.terminal import command_line, progress
-from onespp.render.files.lock import writing
+from onespp.api import scoring as api
 from onespp.render.files.sequence import FrameSequence
 
 from .options import json_option, show_or_print
@@ -43,25 +40,10 @@ def score_in(folder: Path, methods: tuple[str, ...] = (), json_to: str | None = 
              pictures: bool = True, by_cause: bool = False, seeds: tuple[Path, ...] = (),
              movie: bool | None = None, metrics: tuple[str, ...] = ()) -> None:
     """Do what the options of `score` ask."""
-    from onespp.denoise.metrics.own_metric import own_metrics
-    from onespp.denoise.report.contact_sheets import draw_pictures
-    from onespp.denoise.report.movie import require_av
     from onespp.denoise.report.terminal import print_classes, print_scores, print_splits
-    from onespp.denoise.score.sequence import score as score_sequence
 
-    if movie:
-        require_av()
-    sequence = FrameSequence.open(folder)
-    own = own_metrics(metrics)
-    others = [FrameSequence.open(other) for other in seeds]
-    with writing(folder, "score"), progress() as report:
-        scores = score_sequence(sequence, list(methods) or None, report, others, command_line(),
-                                own)
-        if pictures:  # after the scores, which are on disk whatever happens here
-            drawn = [result_name(m) for m in methods if m != INPUT]
-            trouble = draw_pictures(sequence, scores, drawn or None, report,
-                                    movie=movie is not False)
-            scores = scores.model_copy(update={"notes": [*scores.notes, *trouble]})
+    scores = api.score(FrameSequence.open(folder), methods, metrics=metrics, pictures=pictures,
+                       seeds=[FrameSequence.open(other) for other in seeds], movie=movie)
 
     def show() -> None:
         print_scores(scores)

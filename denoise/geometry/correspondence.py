@@ -4,6 +4,8 @@ Symbols as in `reprojection.py`: ' the previous frame, u a pixel's centre, z dep
 camera_from_screen, M world_from_object; X' = V' M'_id M_id^-1 V^-1 (z B u) is where the surface
 was, in camera space, and it was seen in the pixel that X' falls into.
 
+Where a frame has a channel `motion`, it was seen where that says, at the depth of X'.
+
 Nearest pixel, not interpolation: a mean of four pixels has less noise than one, and would flatter
 a noisy method wherever something moves.
 
@@ -40,12 +42,11 @@ def previous_pixel(previous: Frame, current: Frame) -> np.ndarray:
         InputError: a guide is missing, or matrices that do not project.
     """
     h, w = current.height, current.width
-    source = np.full(h * w, NOWHERE)
-    if len(previous.world_from_object) != len(current.world_from_object):
+    source, motions = np.full(h * w, NOWHERE), world_motions(previous, current)
+    if "motion" not in current and len(previous.world_from_object) != len(motions):
         return source.reshape(h, w)
     ids = np.where(has_surface(current), current["id"], -1).ravel()
     b = camera_from_screen(current)
-    motions = world_motions(previous, current)
     for i in np.unique(ids[ids >= 0]):
         motion = motions[i]
         if np.isnan(motion).any() or np.linalg.det(motion[:3, :3]) == 0:  # to or from no size
@@ -68,7 +69,12 @@ def _seen(previous: Frame, current: Frame, i: int, motion: np.ndarray, position:
     b = camera_from_screen(previous)
     screen = was @ np.linalg.inv(b).T
     with np.errstate(divide="ignore", invalid="ignore"):
-        x, y = np.floor(screen[:, :2] / screen[:, 2:]).T
+        seen_at = screen[:, :2] / screen[:, 2:]
+        if "motion" in current:
+            u = np.stack([at % w + 0.5, at // w + 0.5], axis=-1)
+            seen_at = u + current["motion"].reshape(-1, 2)[at]
+            was = was[:, 2:] * (np.pad(seen_at, ((0, 0), (0, 1)), constant_values=1) @ b.T)
+        x, y = np.floor(seen_at).T
     inside = (was[:, 2] > 0) & (x >= 0) & (x < w) & (y >= 0) & (y < h)
     x, y = (np.where(inside, c, 0).astype(np.int64) for c in (x, y))
     tap = y * w + x

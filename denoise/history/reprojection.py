@@ -17,6 +17,10 @@ expected n' = A^-T n, and it lies near the expected tangent plane:
 |n' . (X'_tap - X')| < plane_tolerance z'. Bilinear reprojection weighs the taps that pass and
 renormalises; with less than `LEAST_WEIGHT` there is no history.
 
+Where a frame has a channel `motion` (of a renderer that knows more than matrices tell), x' - x is
+what that says, and z' and n' are as above. For frames without matrices those are of a camera that
+fits the guides, and of objects at rest (`Frame.from_arrays`).
+
 Departure from the assignment: it takes the one nearest pixel and tests the object alone;
 `nearest=True` does the same.
 """
@@ -34,6 +38,7 @@ from onespp.denoise.geometry.motion import world_motions
 from onespp.denoise.inputs.surface import SurfaceSample
 from onespp.denoise.jit.arrays import Bool, Color, Float, Matrix3, UInt, Vector3
 from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.structure import evaluate
 from onespp.denoise.jit.vector import cross, dot, opaque_matrix, transform
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
@@ -64,11 +69,20 @@ class ScreenTransforms(NamedTuple):
     normal_from_plane: Matrix3
 
 
+class ScreenShift(NamedTuple):
+    """Pixels on the screen, along a row and along a column."""
+
+    dx: Float
+    dy: Float
+
+
 class Motion(NamedTuple):
-    """How surfaces moved between two frames: `motion_table` on the device, and transforms."""
+    """How surfaces moved between two frames: `motion_table` on the device, and transforms; x' - x
+    of a frame that has it."""
 
     table: Float
     transforms: ScreenTransforms
+    pixels: ScreenShift | None = None
 
 
 def motion_table(previous: Frame, current: Frame) -> np.ndarray:
@@ -106,13 +120,17 @@ def motion_between(previous: Frame, current: Frame, stencil: Stencil) -> Motion:
     Raises:
         InputError: the frames cannot follow one another, or their matrices do not project.
     """
-    if len(previous.world_from_object) != len(current.world_from_object):
+    pixels = None
+    if "motion" in current:
+        pixels = ScreenShift(*stencil.load(np.asarray(current["motion"], np.float32)))
+        evaluate(pixels)
+    elif len(previous.world_from_object) != len(current.world_from_object):
         raise InputError(
             f"frame {current.index} has {len(current.world_from_object)} objects, the frame "
             f"before it {len(previous.world_from_object)}: they are not of one sequence")
     return Motion(load_table(motion_table(previous, current), stencil),
                   ScreenTransforms(opaque_matrix(stencil, camera_from_screen(current).T),
-                                   opaque_matrix(stencil, screen_from_camera(previous).T)))
+                                   opaque_matrix(stencil, screen_from_camera(previous).T)), pixels)
 
 
 def without_images(frame: Frame) -> Frame:
@@ -153,13 +171,6 @@ class Place:
     nearness: Float
 
 
-class ScreenShift(NamedTuple):
-    """Pixels on the screen, along a row and along a column."""
-
-    dx: Float
-    dy: Float
-
-
 def locate(stencil: Stencil, surface: SurfaceSample, motion: Motion, plane_tolerance: Float,
            shift: ScreenShift | None = None) -> Place:
     """Follow each surface back.
@@ -182,6 +193,8 @@ def locate(stencil: Stencil, surface: SurfaceSample, motion: Motion, plane_toler
     scale = 1 + dw
     shrink = 1 / scale
     x, y = dr.fma(dx - u.x * dw, shrink, u.x), dr.fma(dy - u.y * dw, shrink, u.y)
+    if motion.pixels is not None:
+        x, y = u.x + motion.pixels.dx, u.y + motion.pixels.dy
     inside = (known & (scale > 1e-6) & (x >= 0) & (x < stencil.width)
               & (y >= 0) & (y < stencil.height))
     x, y = dr.select(inside, x, 0.5), dr.select(inside, y, 0.5)

@@ -32,6 +32,7 @@ import numpy as np
 from onespp.render.errors import InputError
 from onespp.render.host import backend
 from onespp.render.host.aligned import aligned
+from onespp.render.host.turns import check_process
 
 from .arrays import Float
 from .structure import arrays_of
@@ -68,6 +69,7 @@ class Stencil:
             raise InputError(f"an image of {width!r} x {height!r} pixels: use whole numbers")
         if height < 1 or width < 1:
             raise InputError(f"an image of {width}x{height} pixels is empty: use 1x1 or more")
+        check_process()
         device = backend.choose(device)
         self.layout = layout or ("views" if device == "llvm" else "gather")
         if self.layout not in ("views", "gather") or (self.layout == "views" and device != "llvm"):

@@ -5,7 +5,7 @@ A lane is an element of a Dr.Jit array: one pixel, or padding at the end of a ro
 
 from __future__ import annotations
 
-from typing import ClassVar, Generic, Protocol, TypeVar
+from typing import ClassVar, Generic, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from onespp.denoise.jit.arrays import Color
 from onespp.denoise.jit.grid import Stencil
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
+from onespp.render.host.turns import turn
 
 
 class OnStencil(Protocol):
@@ -49,8 +50,8 @@ class OnLanes(Generic[State]):
         """State on a stencil that reaches at least `reach` pixels."""
         raise NotImplementedError
 
-    def __call__(self, frame: Frame, state: State) -> tuple[np.ndarray, State]:
-        """(h, w, 3) denoised colour, and the state for the next frame.
+    def __call__(self, frame: Frame, state: State | None) -> tuple[np.ndarray, State]:
+        """(h, w, 3) denoised colour, and the state for the next frame; None begins a sequence.
 
         Where the input is nowhere negative, neither is the result (`filters/debts.py`).
 
@@ -58,10 +59,13 @@ class OnLanes(Generic[State]):
             InputError: a channel is missing, the size is not the state's, the frame has other
                 objects than the one before it, or the state is not one that `init` made.
         """
-        check_call(frame, state, self.reach)
-        color, surface = read_color(frame, state.stencil), read_surface(frame, state.stencil)
-        result, after = self.on_lanes(frame, color, surface, state)
-        image = state.stencil.image(result)
+        with turn():
+            if state is None and isinstance(frame, Frame):
+                state = self.init(frame.height, frame.width)
+            stencil = check_call(frame, state, self.reach)
+            color, surface = read_color(frame, stencil), read_surface(frame, stencil)
+            result, after = self.on_lanes(frame, color, surface, cast("State", state))
+            image = stencil.image(result)
         if not image.min() >= 0 and not (frame["color"] < 0).any():
             repay(image, frame["id"])  # where light is negative, so may a mean of it be
         return image, after
@@ -79,11 +83,14 @@ class OnLanes(Generic[State]):
         raise NotImplementedError
 
 
-def check_call(frame: Frame, state: OnStencil, reach: int) -> None:
-    """InputError where a call is given something else, or too small a state, which taps leave."""
+def check_call(frame: Frame, state: OnStencil | None, reach: int) -> Stencil:
+    """The state's stencil; InputError where a call is given something else, or too small a state,
+    which taps leave."""
     if not isinstance(frame, Frame):
         raise InputError(f"a method was called with a {type(frame).__name__}: give it a Frame")
     stencil = getattr(state, "stencil", None)
     if not isinstance(stencil, Stencil) or stencil.reach < reach:
-        raise InputError("a method was called with a state that is not its own: begin with that of "
-                         "its init(height, width), and go on with the one that its call returns")
+        raise InputError("a method was called with a state that is not its own: begin with None "
+                         "or that of its init(height, width), and go on with the one that its call "
+                         "returns")
+    return stencil

@@ -37,6 +37,7 @@ from onespp.denoise.jit.structure import evaluate
 from onespp.denoise.jit.taps import Offset, Taps, window
 from onespp.denoise.metrics.luminance import luminance
 from onespp.render.frame import Frame
+from onespp.render.host.turns import turn
 
 from .parameters import check_positive, check_whole
 
@@ -221,7 +222,9 @@ class WithoutOutliers(Generic[S]):
     def init(self, height: int, width: int) -> Cleaned[S]:
         return Cleaned(self.outliers.init(height, width), self.method.init(height, width))
 
-    def __call__(self, frame: Frame, state: Cleaned[S]) -> tuple[np.ndarray, Cleaned[S]]:
+    @turn()
+    def __call__(self, frame: Frame, state: Cleaned[S] | None) -> tuple[np.ndarray, Cleaned[S]]:
+        state = state or self.init(frame.height, frame.width)
         frame, outliers = self.outliers(frame, state.outliers)
         image, inner = self.method(frame, state.inner)
         return image, Cleaned(outliers, inner)

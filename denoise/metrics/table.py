@@ -70,13 +70,6 @@ def measure_pair(images: Pair, rows: Iterable[Metric]) -> dict[str, float | None
     return {row.name: row.function(*getattr(images, row.space)) for row in rows}
 
 
-def spread(frames: list[int], count: int | None) -> list[int]:
-    """At most `count` of the frames: first, last, and evenly between; None: all."""
-    if count is None or len(frames) <= count:
-        return frames
-    return [frames[i] for i in np.linspace(0, len(frames) - 1, count).round().astype(int)]
-
-
 _CHANGES = (
     Metric("flicker", "flicker", flicker, "step", "", False, ".4f",
            "sqrt(mean((e_t(p) - e_{t-1}(p'))^2)), e = S(a) - S(b), p' the pixel of the frame "

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from onespp.render.srgb import srgb_from_linear
+from onespp.show.srgb import bytes_from_linear, srgb_from_linear
+
+__all__ = ["TONE_MAP", "bytes_from_linear", "linear_from_srgb", "srgb_from_linear"]
 
 TONE_MAP = "clipped sRGB"
 
@@ -19,8 +21,3 @@ def linear_from_srgb(srgb: np.ndarray) -> np.ndarray:
     """Inverse of `srgb_from_linear` on [0, 1], outside of which it clips."""
     y = np.clip(srgb, 0.0, 1.0)
     return np.where(y <= 0.04045, y / 12.92, ((y + 0.055) / 1.055) ** 2.4)
-
-
-def bytes_from_linear(linear: np.ndarray) -> np.ndarray:
-    """8-bit sRGB for pictures, rounded to nearest; NaN is black. Any shape."""
-    return np.rint(255 * srgb_from_linear(np.nan_to_num(linear, nan=0.0))).astype(np.uint8)

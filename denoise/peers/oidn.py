@@ -25,6 +25,7 @@ from onespp.denoise.methods.parameters import check_choice
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.host import backend
+from onespp.render.host.turns import turn
 
 AVAILABLE = importlib.util.find_spec("mitsuba_oidn") is not None
 
@@ -66,8 +67,10 @@ class Oidn:
             raise InputError(f"an image of {width}x{height} pixels is empty")
         return OidnState(height, width, self)
 
-    def __call__(self, frame: Frame, state: OidnState) -> tuple[np.ndarray, OidnState]:
+    @turn()
+    def __call__(self, frame: Frame, state: OidnState | None) -> tuple[np.ndarray, OidnState]:
         """(h, w, 3) float32; InputError if a channel is missing or the size is another."""
+        state = state or self.init(frame.height, frame.width)
         if (frame.height, frame.width) != (state.height, state.width):
             raise InputError(f"frame {frame.index} is {frame.width}x{frame.height}, the denoiser's "
                              f"state was made for {state.width}x{state.height}: make a new one")

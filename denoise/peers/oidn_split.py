@@ -47,8 +47,9 @@ class OidnSplit:
         """As that of `Oidn`."""
         return self.oidn.init(height, width)
 
-    def __call__(self, frame: Frame, state: OidnState) -> tuple[np.ndarray, OidnState]:
+    def __call__(self, frame: Frame, state: OidnState | None) -> tuple[np.ndarray, OidnState]:
         """(h, w, 3) float32; InputError as from `Oidn`."""
+        state = state or self.init(frame.height, frame.width)
         if not is_split(frame):
             return self.oidn(frame, state)
         visibility, rest = split(frame)

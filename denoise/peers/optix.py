@@ -23,6 +23,7 @@ from onespp.denoise.inputs.surface import GUIDES
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.host import backend
+from onespp.render.host.turns import turn
 
 WEIGHTS = Path("/usr/share/nvidia/nvoptix.bin")
 """Where the driver for Linux keeps the network."""
@@ -61,7 +62,9 @@ class Optix:
         return OptixState(mi, mi.OptixDenoiser(
             mi.ScalarVector2u(width, height), albedo=True, normals=True, temporal=self.temporal))
 
-    def __call__(self, frame: Frame, state: OptixState) -> tuple[np.ndarray, OptixState]:
+    @turn()
+    def __call__(self, frame: Frame, state: OptixState | None) -> tuple[np.ndarray, OptixState]:
+        state = state or self.init(frame.height, frame.width)
         mi = state.mitsuba
         color = mi.TensorXf(repair(np.asarray(frame["color"], np.float32), frame["id"]))
         albedo, normal = (mi.TensorXf(np.nan_to_num(frame[name])) for name in ("albedo", "normal"))

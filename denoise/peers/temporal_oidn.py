@@ -30,8 +30,9 @@ class TemporalOidn:
     def init(self, height: int, width: int) -> tuple[TemporalState, OidnState]:
         return self.temporal.init(height, width), self.oidn.init(height, width)
 
-    def __call__(self, frame: Frame, state: tuple[TemporalState, OidnState]
+    def __call__(self, frame: Frame, state: tuple[TemporalState, OidnState] | None
                  ) -> tuple[np.ndarray, tuple[TemporalState, OidnState]]:
+        state = state or self.init(frame.height, frame.width)
         emission = emission_of(frame) if self.oidn.emission_apart else np.zeros(1, np.float32)
         images = {k: v for k, v in frame.images.items() if k != "emission"}
         light = replace(frame, images={**images, "color": frame["color"] - emission})

@@ -46,8 +46,9 @@ class TemporalOidnSplit:
         histories = tuple(self.temporal.init(height, width) for _ in range(SIGNALS))
         return SplitState(histories, network)
 
-    def __call__(self, frame: Frame, state: SplitState) -> tuple[np.ndarray, SplitState]:
+    def __call__(self, frame: Frame, state: SplitState | None) -> tuple[np.ndarray, SplitState]:
         """(h, w, 3) float32; InputError as from `Oidn` and `Temporal`."""
+        state = state or self.init(frame.height, frame.width)
         if not is_split(frame):
             whole = TemporalOidn(self.temporal, self.split.oidn)
             image, (history, network) = whole(frame, (state.histories[0], state.network))
@@ -59,7 +60,7 @@ class TemporalOidnSplit:
         albedo = _albedo(frame)
         for signal, history in zip((visibility, glossy, (rest - glossy) / albedo),
                                    state.histories):
-            guides = {name: frame[name] for name in GUIDES}
+            guides = {name: frame[name] for name in (*GUIDES, "motion") if name in frame}
             image, after = self.temporal(replace(frame, images={**guides, "color": signal}),
                                          history)
             smooth.append(image)

@@ -13,10 +13,11 @@ import numpy as np
 from PIL import Image
 
 from onespp.denoise.metrics.image import pair
-from onespp.denoise.metrics.table import HEADLINE, spread
+from onespp.denoise.metrics.table import HEADLINE
 from onespp.denoise.metrics.tonemap import bytes_from_linear
 from onespp.denoise.score.scorecard import INPUT, Scores
 from onespp.render.files.atomic import replacing
+from onespp.render.files.frame_ranges import spread
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.progress import Progress, silent
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import jinja2
 import numpy as np
 
-from onespp.denoise.score.scorecard import INPUT, Scores
+from onespp.denoise.score.scorecard import INPUT, Scores, caption
 from onespp.render.channels import CHANNELS, Display
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import all_or_none, write_text
@@ -29,7 +29,6 @@ from . import page_images as packed
 from .contact_sheets import display_errors
 from .page_data import best_cells, highlights, page_data, table_data
 from .provenance import provenance
-from .terminal import caption
 
 EDGES = np.logspace(-4, 0, 49)
 """Edges of the bins of the histogram; errors below the first are in the first bin."""
@@ -81,6 +80,23 @@ def write_report(sequence: FrameSequence, scores: Scores, channels: Iterable[str
         old.unlink()
     write_text(folder / "index.html", render_page(sequence, scores, data, command))
     return folder / "index.html"
+
+
+def inlined(page: Path) -> str:
+    """The text of a report as one file, which holds its images."""
+    data = page.parent / "data"
+    files = {path.relative_to(data).with_suffix("").as_posix(): path.read_text("utf-8")
+             for path in sorted(data.glob("**/*.js"))}
+    script = f"<script>window.onesppFiles = {_safe(files)};</script>\n"
+    return page.read_text("utf-8").replace(_DATA, script + _DATA, 1)
+
+
+_DATA = '<script type="application/json" id="data">'
+
+
+def _safe(data: object) -> str:
+    """JSON in which no "<" lets a name in the data end the element that holds it."""
+    return json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def _channels(sequence: FrameSequence, wanted: Iterable[str] | None) -> list[str]:
@@ -145,5 +161,4 @@ def render_page(sequence: FrameSequence, scores: Scores, data: dict, command: st
         made=provenance(sequence, scores, command), style=text("page.css"),
         glossy="roughness" in sequence.channels,
         script="\n".join(text(name) for name in _SCRIPTS),
-        # "<" would let a name in the data end the element that holds it.
-        data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"))
+        data=_safe(data))

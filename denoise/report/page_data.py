@@ -12,13 +12,13 @@ from onespp.denoise.metrics.errors import PSNR_CAP
 from onespp.denoise.metrics.metric import Metric
 from onespp.denoise.metrics.table import HEADLINE
 from onespp.denoise.score.causes import CAUSES, HISTORIES
-from onespp.denoise.score.scorecard import INPUT, ClassScore, MethodScore, Scores
+from onespp.denoise.score.method_score import ClassScore, MethodScore
+from onespp.denoise.score.scorecard import INPUT, Scores, cells
 from onespp.render.channels import CHANNELS
 from onespp.render.files.sequence import FrameSequence
 
 from .panels import ERROR_MAX
 from .speed_error_plot import pareto_front, times_are
-from .terminal import cells
 
 _SHOWN_ELSEWHERE = {"method", "ms_per_frame", "machine"}
 

@@ -10,13 +10,12 @@ from typing import Any
 
 from onespp.denoise.methods.parameters import present_parameters
 from onespp.denoise.score.commands import commands
-from onespp.denoise.score.scorecard import INPUT, Scores
+from onespp.denoise.score.scorecard import INPUT, Scores, caption
 from onespp.render.files.manifest import Run
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.files.times import Times, read_times
 
 from .page_data import text_of
-from .terminal import caption
 
 
 def provenance(sequence: FrameSequence, scores: Scores, command: str = "") -> dict[str, Any]:

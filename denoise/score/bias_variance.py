@@ -29,7 +29,7 @@ from onespp.render.errors import InputError
 from onespp.render.files.manifest import first_difference
 from onespp.render.files.sequence import FrameSequence
 
-from .scorecard import INPUT, ErrorSplit
+from .method_score import INPUT, ErrorSplit
 
 
 def split_errors(sequences: list[FrameSequence], methods: list[str]) -> dict[str, ErrorSplit]:

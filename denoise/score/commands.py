@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.files.times import read_times
 
-from .scorecard import INPUT
+from .method_score import INPUT
 
 
 def commands(sequence: FrameSequence, methods: Iterable[str]) -> list[str]:

@@ -35,7 +35,8 @@ from onespp.denoise.own_method import result_name
 from onespp.render.errors import InputError
 from onespp.render.files.json_file import JsonFile, format_json
 
-from .scorecard import MethodScore, OwnMetric, Scores
+from .method_score import MethodScore
+from .scorecard import OwnMetric, Scores
 
 TIME = Metric("ms", "time", lambda a, b: None, "", "ms", False, ".1f", "milliseconds a frame")
 SIGMAS = 2.0

@@ -67,7 +67,7 @@ class FrameTruth:
 def read_frame_truth(sequence: FrameSequence, number: int,
                      before: FrameTruth | None) -> tuple[FrameTruth, Frame]:
     """The ground of a frame, and the frame itself. `before`: of the frame before, None if none."""
-    wanted = ("color", *GUIDES, "albedo", "roughness")
+    wanted = ("color", *GUIDES, "motion", "albedo", "roughness")
     frame = sequence.read_frame(number, [c for c in wanted if c in sequence.channels])
     reference = sequence.read_reference(number) if sequence.has_reference(number) else None
     guided = all(name in frame for name in GUIDES)

@@ -8,12 +8,13 @@ beside the declared fields, under their names: `scores.methods["input"]["psnr_sr
 from __future__ import annotations
 
 import csv
+import importlib
 import io
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import ConfigDict, Field, FiniteFloat, field_validator, model_serializer
+from pydantic import Field, FiniteFloat, field_validator
 
 from onespp.denoise.metrics.metric import Metric
 from onespp.denoise.metrics.own_metric import FORMAT, source_of
@@ -21,39 +22,9 @@ from onespp.denoise.metrics.table import ESTIMATED, HEADLINE, MEASURES
 from onespp.denoise.own_method import result_name
 from onespp.render.errors import InputError
 from onespp.render.files.json_file import JsonFile, format_json, read_json
+from onespp.show.html import table_html
 
-INPUT = "input"
-"""The method that does nothing: the noisy frames themselves."""
-
-
-class Measured(JsonFile):
-    """Fields of its own, and one number or null for each metric."""
-
-    model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, FiniteFloat | None]
-
-    def __getitem__(self, metric: str) -> float | None:
-        return self.__pydantic_extra__.get(metric)
-
-    @model_serializer(mode="wrap")
-    def _rows_last(self, serialize: Any) -> dict[str, Any]:
-        data = serialize(self)  # the summary is read first, so it stands first
-        return {key: data[key] for key in sorted(data, key=lambda key: key == "per_frame")}
-
-
-class FrameScore(Measured):
-    """One frame of one method.
-
-    Attributes:
-        ms: time to denoise it, without reading and writing files.
-        errors: measure -> standard error of its value, of those that halves of the reference
-            give; a measure without a value has none (`estimate.py`: too near to 0 to have dB).
-    """
-
-    frame: int
-    ms: FiniteFloat | None
-    non_finite_pixels: int
-    errors: dict[str, FiniteFloat] = Field(default_factory=dict)
+from .method_score import INPUT, FrameScore, MethodScore
 
 
 class OwnMetric(JsonFile):
@@ -79,80 +50,6 @@ class OwnMetric(JsonFile):
         """All of it but the function: its values can be read, and no others made."""
         return Metric(name, self.label, lambda a, b: None, "", self.unit, self.higher_is_better,
                       self.format, self.about)
-
-
-class ClassScore(JsonFile):
-    """A method's error on the pixels of one class, pooled over frames.
-
-    Attributes:
-        pixels: share of all pixels. mse_share: share of the method's squared error.
-        psnr_srgb: dB of the mean squared error in the class; null if it has no pixels, or an
-            error that the reference's halves cannot tell from 0. error: its standard error; null
-            without halves.
-    """
-
-    pixels: FiniteFloat
-    mse_share: FiniteFloat
-    psnr_srgb: FiniteFloat | None
-    error: FiniteFloat | None = None
-
-
-class ErrorSplit(JsonFile):
-    """Bias and variance of display values over renders with other seeds (`bias_variance.py`).
-
-    bias_error: standard error of bias_squared by the reference's noise; null without halves.
-    """
-
-    renders: int
-    frames: int
-    mse: FiniteFloat
-    bias_squared: FiniteFloat
-    variance: FiniteFloat
-    bias_error: FiniteFloat | None = None
-
-
-class MethodScore(Measured):
-    """One method over the sequence; its measures are means over `per_frame` (`means.py`).
-
-    Attributes:
-        method: what made the results, as `Run.method`; "" for the input. changed: `Run.changed`.
-        ms_per_frame: median over the frames after the first. first_ms: the first, which
-            includes compiling. Both null for the input. `interleaved`: the median is that of
-            `onespp time`, measured in turns with other methods.
-        startup_ms: what the first three frames took beyond that median each: compiling, loading.
-        megapixels_per_s: pixels over that median. peak_mb: of `Run`.
-        non_finite_pixels: sum over frames; such pixels were scored as black.
-        identical_frames: those that display the same as the reference: infinite PSNR.
-        device, machine, threads, parameters, versions: of the run that made the results.
-        by_cause, by_history: error by `classes.CAUSES` and `HISTORIES`, over the frames that
-            have a frame before them; empty without reference or guides.
-        split: bias and variance, where other seeds were given.
-        errors: measure -> standard error of its value, by the noise of the reference alone.
-        bounds: measures whose value is only a bound, on the side of the worse: the truth is as
-            good or better, beyond what the reference can tell.
-    """
-
-    method: str = ""
-    changed: dict[str, Any] = Field(default_factory=dict)
-    ms_per_frame: FiniteFloat | None
-    first_ms: FiniteFloat | None
-    startup_ms: FiniteFloat | None = None
-    megapixels_per_s: FiniteFloat | None = None
-    peak_mb: FiniteFloat | None = None
-    interleaved: bool = False
-    non_finite_pixels: int
-    identical_frames: list[int] = Field(default_factory=list)
-    device: str
-    machine: str = ""
-    threads: int | None
-    parameters: dict[str, Any]
-    versions: dict[str, str]
-    by_cause: dict[str, ClassScore] = Field(default_factory=dict)
-    by_history: dict[str, ClassScore] = Field(default_factory=dict)
-    split: ErrorSplit | None = None
-    errors: dict[str, FiniteFloat] = Field(default_factory=dict)
-    bounds: list[str] = Field(default_factory=list)
-    per_frame: list[FrameScore]
 
 
 class Scores(JsonFile):
@@ -243,16 +140,39 @@ class Scores(JsonFile):
     def csv_text(self) -> str:
         """One row for each method and frame."""
         text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        measures = self.measures
-        writer.writerow(["method", "frame", *measures, "ms", "reference_floor_db",
-                         "non_finite_pixels", *(f"{m}_error" for m in ESTIMATED)])
-        for name, method in self.methods.items():
-            for row in method.per_frame:
-                writer.writerow([name, row.frame, *(row[m] for m in measures), row.ms,
-                                 self.reference_floor_per_frame.get(row.frame),
-                                 row.non_finite_pixels, *(row.errors.get(m) for m in ESTIMATED)])
+        writer = csv.DictWriter(text, self._rows()[0].keys(), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(self._rows())
         return text.getvalue()
+
+    def to_pandas(self) -> Any:
+        """A `pandas.DataFrame` of what scores.csv holds: a row for each method and frame.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        try:
+            pandas = importlib.import_module("pandas")  # no dependency of ours
+        except ImportError:
+            raise InputError("to_pandas() needs pandas, which is not installed: run "
+                             "`pip install pandas`, or read scores.csv") from None
+        return pandas.DataFrame(self._rows())
+
+    def _rows(self) -> list[dict[str, Any]]:
+        measures = list(self.measures)
+        return [{"method": name, "frame": row.frame, **{m: row[m] for m in measures}, "ms": row.ms,
+                 "reference_floor_db": self.reference_floor_per_frame.get(row.frame),
+                 "non_finite_pixels": row.non_finite_pixels,
+                 **{f"{m}_error": row.errors.get(m) for m in ESTIMATED}}
+                for name, method in self.methods.items() for row in method.per_frame]
+
+    def _repr_html_(self) -> str:
+        """The table of the command line, for a notebook."""
+        rows = {name: cells(self, name) for name in self.ordered()}
+        bold = {(self.label(name), heading) for name, heading in best(self)}
+        return table_html(f"{self.scene}: speed against error",
+                          {self.label(name): row for name, row in rows.items()}, bold,
+                          [caption(self), *self.notes])
 
 
 def taken_names() -> set[str]:
@@ -272,3 +192,78 @@ def check_own(metrics: Iterable[Metric]) -> None:
 def read_scores(path: Path) -> Scores:
     """Scores of a scores.json; InputError where it is missing or is none."""
     return read_json(path, Scores)
+
+
+def cells(scores: Scores, name: str) -> dict[str, str]:
+    """Column heading -> text, for one method."""
+    method = scores.methods[name]
+    # (Only the headline's error is shown: the others' are in the files, and tables stay narrow.)
+    row = {_heading(m): m.text(method[m.name],
+                               method.errors.get(m.name) if m is HEADLINE else None,
+                               m.name in method.bounds) for m in _columns(scores)}
+    gain = None if name == INPUT else _gain(scores, method)
+    row[f"gain ({HEADLINE.unit})"] = _number(gain, "+.2f")
+    row["ms/frame"] = _number(method.ms_per_frame, ".1f")
+    if any(len(m.per_frame) < len(scores.frames) for m in scores.methods.values()):
+        row["frames"] = f"{len(method.per_frame)}/{len(scores.frames)}"
+    return row
+
+
+def caption(scores: Scores) -> str:
+    """What the numbers stand on; nothing in it depends on the machine."""
+    width, height = scores.size
+    parts = [f"{len(scores.frames)} frames of {width}x{height}"]
+    if scores.has_reference:
+        parts.append(f"{HEADLINE.label} on {scores.tone_map}, mean over frames")
+        parts.append(f"reference {scores.reference_spp or 'of unknown'} spp")
+        if scores.reference_halves:
+            parts[-1] += f" in two halves, {HEADLINE.label} free of its noise but for ±"
+            if scores.flip_floor is not None:
+                parts.append(f"a perfect image would have FLIP {scores.flip_floor:.4f}")
+        elif scores.headline_floor is not None:
+            parts[-1] += (f", whose own noise caps {HEADLINE.label} at "
+                          f"{scores.headline_floor:.1f} {HEADLINE.unit}")
+    return "; ".join([*parts, "time: median after the first frame, without files"]) + "."
+
+
+def _columns(scores: Scores) -> list[Metric]:
+    return [row for row in scores.measures.values() if row.in_table]
+
+
+def _heading(metric: Metric) -> str:
+    return f"{metric.label} ({metric.unit})" if metric.unit else metric.label
+
+
+def _number(value: float | None, form: str) -> str:
+    return "-" if value is None else f"{value:{form}}"
+
+
+def _gain(scores: Scores, method: MethodScore) -> float | None:
+    """dB over the input on the frames that the method has and that count in both means."""
+    unfiltered = scores.methods[INPUT]
+    if any(row[HEADLINE.name] is None and row.errors for row in method.per_frame):
+        return _difference(scores, method)
+    noisy = {row.frame: row[HEADLINE.name] for row in unfiltered.per_frame}
+    gains = {row.frame: db - base for row in method.per_frame
+             if (db := row[HEADLINE.name]) is not None and (base := noisy[row.frame]) is not None}
+    left_out = {*unfiltered.identical_frames, *method.identical_frames}
+    counted = [gain for i, gain in gains.items() if i not in left_out] or list(gains.values())
+    return sum(counted) / len(counted) if counted else None
+
+
+def _difference(scores: Scores, method: MethodScore) -> float | None:
+    """Of the sequence's numbers, where single frames have none."""
+    value, base = method[HEADLINE.name], scores.methods[INPUT][HEADLINE.name]
+    return None if value is None or base is None else value - base
+
+
+def best(scores: Scores) -> set[tuple[str, str]]:
+    """(method, heading) of the best value of each metric."""
+    found = set()
+    for metric in _columns(scores):
+        values = {name: value for name, method in scores.methods.items()
+                  if (value := method[metric.name]) is not None}
+        if len(values) > 1:
+            pick = max if metric.higher_is_better else min
+            found.add((pick(values, key=values.__getitem__), _heading(metric)))
+    return found

@@ -16,7 +16,7 @@ from onespp.denoise.metrics.table import HEADLINE, MEASURES, METRICS, STABILITY,
 
 from .causes import BACKGROUND, CAUSES, HISTORIES, history_class
 from .frame_truth import FrameTruth
-from .scorecard import ClassScore, FrameScore
+from .method_score import ClassScore, FrameScore
 
 
 class Tally:

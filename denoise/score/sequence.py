@@ -21,12 +21,12 @@ from onespp.denoise.metrics.estimate import BOUND, Number
 from onespp.denoise.metrics.means import identical, mean_decibels, sequence_number
 from onespp.denoise.metrics.metric import Metric
 from onespp.denoise.metrics.noise_floor import reference_floor, seen_floors
-from onespp.denoise.metrics.table import HEADLINE, MEASURES, METRICS, spread
+from onespp.denoise.metrics.table import HEADLINE, MEASURES, METRICS
 from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.denoise.own_method import result_name
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
-from onespp.render.files.frame_ranges import format_frames
+from onespp.render.files.frame_ranges import format_frames, spread
 from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.files.times import read_times
 from onespp.render.progress import Progress, silent
@@ -35,8 +35,9 @@ from .bias_variance import check_seeds, split_errors
 from .commands import commands
 from .cost import cost
 from .frame_truth import FrameTruth, read_frame_truth
+from .method_score import INPUT, MethodScore
 from .paired import PairedErrors
-from .scorecard import INPUT, MethodScore, OwnMetric, Scores, check_own
+from .scorecard import OwnMetric, Scores, check_own
 from .scorer import MethodScorer
 
 MOST_LOST = 0.01

@@ -12,7 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from onespp.denoise.score.scorecard import MethodScore, Scores
+from onespp.denoise.score.method_score import MethodScore
+from onespp.denoise.score.scorecard import Scores
 from onespp.render.errors import InputError
 
 BEST = "best"

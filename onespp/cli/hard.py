@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -14,9 +11,6 @@ from onespp.render.cli.figures import json_option, show_or_print
 from onespp.render.cli.options import device_option, threads_option, use
 from onespp.render.cli.terminal import progress
 from onespp.render.progress import Progress
-
-if TYPE_CHECKING:
-    from onespp.denoise.catalog import Method
 
 REFERENCE_SPP = 256
 
@@ -41,6 +35,7 @@ def hard(names: tuple[str, ...], methods: tuple[str, ...], out: Path, reference_
     recovers from a sudden change, and whether it keeps the energy.
     """
     use(device, threads)
+    from onespp.api.studies import judge_hard
     from onespp.denoise.catalog import METHODS
     from onespp.denoise.studies.hard_scenes import markdown
     from onespp.scenes import catalog
@@ -52,29 +47,10 @@ def hard(names: tuple[str, ...], methods: tuple[str, ...], out: Path, reference_
     rows, chosen = [], built(method_names(methods) if methods else METHODS)
     with progress() as report:
         for number, name in enumerate(names or HARD):
-            rows += _judge_hard(name, chosen, out, reference_spp,
-                                _within(report, number, len(names or HARD), name))
+            rows += judge_hard(name, chosen, out / name, reference_spp,
+                               _within(report, number, len(names or HARD), name),
+                               lambda note, name=name: click.echo(f"{name}: {note}", err=True))
     show_or_print(rows, json_to, lambda: click.echo(markdown(rows)))
-
-
-def _judge_hard(name: str, methods: Mapping[str, Method], out: Path, reference_spp: int,
-                report: Progress) -> list:
-    """Rows of one hard scene."""
-    from onespp.denoise.studies.hard_scenes import judge
-    from onespp.render.job import RenderJob, render_sequence
-    from onespp.render.references import reference_notes
-    from onespp.scenes.hard import HARD
-
-    hard = HARD[name]
-    scene = hard.make()
-    job = RenderJob(scene, range(scene.frames), scene.height, scene.width,
-                    reference_spp=reference_spp)
-    needed = {channel for method in methods.values() for channel in method.needs}
-    job = replace(job, channels=tuple(dict.fromkeys((*job.channel_names(), *sorted(needed)))))
-    sequence = render_sequence(job, out / name, progress=report)
-    for note in reference_notes(sequence, sequence.frames, reference_spp):
-        click.echo(f"{name}: {note}", err=True)
-    return judge(sequence, name, hard.event, hard.diffuse, report, methods)
 
 
 def _within(report: Progress, number: int, count: int, name: str) -> Progress:

@@ -97,6 +97,7 @@ def _pairs(folders: tuple[Path, ...], method: str, peer: str, json_to: str | Non
 
 def _suite(method: str, pattern: re.Pattern[str], out: Path, size: str | None, frames: str,
            reference_spp: int, seed: int, json_to: str | None) -> None:
+    from onespp.api.studies import plain_copy
     from onespp.denoise.studies.suite import Group, figures, groups, markdown
     from onespp.scenes.catalog import GENERATED
     from onespp.scenes.generated import KEPT
@@ -115,7 +116,7 @@ def _suite(method: str, pattern: re.Pattern[str], out: Path, size: str | None, f
                 scene, out / scene, frames=frames, size=pixels, seed=seed,
                 reference_spp=reference_spp)
             if group.plain:
-                rendered = _plain(rendered, out / "plain" / scene)
+                rendered = plain_copy(rendered, out / "plain" / scene, command_line())
             scored[scene] = _scored(rendered, method, group.peers)
         found[group] = scored
     show_or_print(figures(result_name(method), found), json_to,
@@ -123,35 +124,14 @@ def _suite(method: str, pattern: re.Pattern[str], out: Path, size: str | None, f
 
 
 def _scored(sequence: FrameSequence, method: str, peers: tuple[str, ...]) -> Scores:
-    """Scores of the method and its peers, after denoising by the method and by peers not yet
-    there: the method is what changes from one time to the next."""
+    """Scores of the method and its peers, after denoising by those without results."""
+    from onespp.api.studies import without_results
     from onespp.denoise.score.sequence import score
 
-    missing = [peer for peer in peers if peer == method or not all(
-        sequence.has_result(peer, i) for i in sequence.frames)]
-    denoise_in(sequence.folder, (*missing, *({method} - {*missing})))
+    denoise_in(sequence.folder, tuple(without_results(sequence, method, peers)))
     with writing(sequence.folder, "score"):
         return score(sequence, list(dict.fromkeys((result_name(method), *peers))),
                      command=command_line())
-
-
-def _plain(sequence: FrameSequence, folder: Path) -> FrameSequence:
-    """The frames exported to the assignment's layout and imported into `folder`, with the
-    references of the original; what is there is kept."""
-    from onespp.render.games202.convert import export_games202, import_games202
-
-    there = (folder / "manifest.json").exists()
-    if not there or not all(map((kept := FrameSequence.open(folder)).has_frame, kept.frames)):
-        files = sequence.folder / "games202"
-        export_games202(sequence, files)
-        with writing(folder, "render", alone=there):
-            import_games202(files, folder, fps=sequence.manifest.fps, overwrite=there,
-                            command=command_line())
-    plain = FrameSequence.open(folder)
-    for k, i in zip(plain.frames, sequence.frames, strict=True):
-        if not plain.has_reference(k):
-            plain.write_reference(k, sequence.read_reference(i))
-    return plain.with_reference_spp()
 
 
 def _pattern(text: str) -> re.Pattern[str]:

@@ -9,8 +9,9 @@ from click.core import ParameterSource
 
 from onespp.denoise.cli.denoise import DEFAULT_METHODS, check_methods, denoise_in
 from onespp.denoise.cli.score import score_in
+from onespp.render.channels import asked_channels
 from onespp.render.cli.options import render_options, use
-from onespp.render.cli.render import channel_names, render_to
+from onespp.render.cli.render import render_to
 
 REFERENCE_ERROR = 0.05  # dB
 
@@ -31,7 +32,7 @@ def run(context: click.Context, scene: str, out: Path | None, methods: tuple[str
     References are as with --reference-error 0.05, unless their samples are given.
     """
     use(device, threads)
-    named, added = channel_names(channels)
+    named, added = asked_channels(channels)
     check_methods(methods, (*(named or ()), *added))
     if reference_spp is None and reference_error is None:
         reference_error = REFERENCE_ERROR

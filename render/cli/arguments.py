@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import re
 
+from onespp.api.rendering import LARGEST_SIDE
 from onespp.render.errors import InputError
-
-LARGEST_SIDE = 16384
 
 
 def parse_size(text: str) -> tuple[int, int]:

@@ -6,17 +6,15 @@ from pathlib import Path
 
 import click
 
-from onespp.render.channels import OFFERED, REPLAY
-from onespp.render.errors import InputError
+from onespp.api import rendering as api
 from onespp.render.files.frame_ranges import parse_frames
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import FrameSequence
-from onespp.render.host.memory import require_memory
 from onespp.scenes import catalog
 
 from .arguments import parse_size
 from .options import overwrite_option, render_options, use
-from .terminal import command_line, note, progress
+from .terminal import command_line
 
 
 @click.command()
@@ -34,47 +32,12 @@ def render(scene: str, out: Path | None, device: str, threads: int | None, **opt
     click.echo(f"rendered {len(sequence.frames)} frames into {sequence.folder}")
 
 
-def render_to(scene_name: str, out: Path | None, *, frames: str | None = None,
-              size: str | None = None, seed: int = 0, reference_spp: int | None = None,
-              reference_error: float | None = None, antialias: bool = False,
-              channels: str | None = None, half: bool = False, direct: str = "resampled",
-              sampler: str = "zsobol", overwrite: bool = False) -> FrameSequence:
+def render_to(scene: str, out: Path | None, *, frames: str | None = None, size: str | None = None,
+              **options) -> FrameSequence:
     """Do what the options of a command ask."""
-    scene = catalog.load(scene_name)
-    height, width = parse_size(size) if size is not None else (scene.height, scene.width)
-    numbers = parse_frames(frames) if frames is not None else tuple(range(scene.frames))
-    if seed < 0:
-        raise InputError(f"--seed is {seed}: use 0 or more")
-    require_memory(height, width)
-    names, added = channel_names(channels)
-    from onespp.render.job import RenderJob, render_sequence  # imports Mitsuba
-    from onespp.render.references import reference_notes
-
-    job = RenderJob(scene, numbers, height, width, seed, reference_spp, antialias, names,
-                    direct, sampler, command_line(), added, channels == "training",
-                    half, reference_error)
-    out = out or Path("data") / scene.name
-    with writing(out, "render", alone=overwrite), progress() as report:
-        sequence = render_sequence(job, out, overwrite=overwrite, progress=report, tell=note)
-    if job.fewest_spp is not None:
-        for sentence in reference_notes(sequence, numbers, reference_spp):
-            click.echo(sentence)
-    return sequence
-
-
-def channel_names(text: str | None) -> tuple[tuple[str, ...] | None, tuple[str, ...]]:
-    """The channels asked for, None for the default ones, and those to add to them."""
-    if text in (None, "training"):
-        return None, ()
-    added = text.startswith("+")
-    names = [name.strip() for name in text[added:].split(",") if name.strip()]
-    names = [n for name in names for n in (REPLAY if name == "gradient" else (name,))]
-    unknown = [name for name in names if name not in OFFERED]
-    if unknown or not names:
-        raise InputError(f"--channels names {unknown[0] if unknown else 'nothing'}: "
-                         f"use some of {', '.join(OFFERED)}")
-    chosen = tuple(name for name in OFFERED if name in names)
-    return (None, chosen) if added else (chosen, ())
+    return api.render(scene, out or Path("data") / catalog.load(scene).name,
+                      frames=None if frames is None else parse_frames(frames),
+                      size=None if size is None else parse_size(size), **options)
 
 
 FORMATS = click.option("--format", "layout", type=click.Choice(["games202"]), default="games202",

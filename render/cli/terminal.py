@@ -24,6 +24,7 @@ from rich.progress import (
 )
 from rich.progress import Progress as Bar
 
+from onespp.api.caller import Caller, calling
 from onespp.render.errors import InputError, readable
 from onespp.render.progress import Progress
 
@@ -178,8 +179,9 @@ def _run(command: click.Command, arguments: Sequence[str] | None, name: str) -> 
         signal.signal(number, _Stop.ask)
     typed = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        command.main(args=typed, prog_name=name, standalone_mode=False,
-                     obj=readable(shlex.join([*name.split(), *typed])))
+        with calling(Caller(progress, note, click.echo, command_line, options=True)):
+            command.main(args=typed, prog_name=name, standalone_mode=False,
+                         obj=readable(shlex.join([*name.split(), *typed])))
     except click.ClickException as error:
         error.show()
         sys.exit(BAD_INPUT)

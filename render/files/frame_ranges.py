@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterable
 from itertools import pairwise
 
+import numpy as np
+
 from onespp.render.errors import InputError
 
 _MOST_FRAMES = 100_000
@@ -44,3 +46,15 @@ def format_frames(frames: Iterable[int]) -> str:
         else:
             runs.append([i])
     return ",".join(f"{r[0]}:{r[-1] + 1}" if len(r) > 1 else str(r[0]) for r in runs)
+
+
+def spread(frames: list[int], count: int | None) -> list[int]:
+    """At most `count` of the frames: first, last, and evenly between; None: all.
+
+    Example:
+        >>> spread([0, 1, 2, 3, 5], 3)
+        [0, 2, 5]
+    """
+    if count is None or len(frames) <= count:
+        return frames
+    return [frames[i] for i in np.linspace(0, len(frames) - 1, count).round().astype(int)]

@@ -20,10 +20,11 @@ p_3 = m - h - q_1: those are noise, and half precision takes less than a thousan
 from __future__ import annotations
 
 import contextlib
+import html
 import io
 import re
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,16 +34,21 @@ from onespp.render.channels import CHANNELS, MOST_GROUPS, REFERENCE
 from onespp.render.derived import available, sources, with_derived
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
+from onespp.show.html import WIDEST, strip_html
+from onespp.show.pictures import fitted
 
 from .atomic import read_bytes, write_bytes, write_text
 from .cleaning import remove_files, remove_sequence
 from .exr import read_exr, read_header, write_exr
+from .frame_ranges import spread
 from .json_file import format_json, read_json
 from .manifest import Manifest, Run, check_result_name, first_difference
 from .matrices import format_matrices, read_matrices
 
 _HALF_MAX = float(np.finfo(np.float16).max)
 _UNKNOWN = "unknown"
+MOST_SHOWN = 24
+"""Frames that a notebook shows of a sequence, spread evenly."""
 
 
 @dataclass(frozen=True)
@@ -152,6 +158,28 @@ class FrameSequence:
     def size(self) -> tuple[int, int]:
         """(height, width)."""
         return self.manifest.height, self.manifest.width
+
+    def __iter__(self) -> Iterator[Frame]:
+        """The frames that are there, in order, with all channels; one is read at a time."""
+        return (self.read_frame(i) for i in self.frames if self.has_frame(i))
+
+    def _repr_html_(self) -> str:
+        """Input, results and references of the frame that a slider chooses, for a notebook."""
+        frames = spread([i for i in self.frames if self.has_frame(i)], MOST_SHOWN)
+        title = (f"{self.manifest.scene}: {len(self.frames)} frames of {self.manifest.width}x"
+                 f"{self.manifest.height} in {self.folder}")
+        if not frames:
+            return f"<div><b>{html.escape(title)}</b>: no frames yet</div>"
+        rows: dict[str, list[np.ndarray | None]] = {
+            "input": [self.read_frame(i, ("color",))["color"] for i in frames]}
+        for name in self.methods():
+            rows[name] = [self.read_result(name, i) if self.has_result(name, i) else None
+                          for i in frames]
+        rows["reference"] = [self.read_reference(i).color if self.has_reference(i) else None
+                             for i in frames]
+        shown = {label: [None if image is None else fitted(image, WIDEST) for image in images]
+                 for label, images in rows.items() if any(image is not None for image in images)}
+        return strip_html(title, frames, shown)
 
     def has_frame(self, i: int) -> bool:
         return self._path("frames", i).exists() and self._path("frames", i, "json").exists()

@@ -20,6 +20,7 @@ from onespp.render.channels import (
 )
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
+from onespp.render.host.turns import turn
 from onespp.render.mitsuba.variant import mi
 
 from .camera_rays import camera_matrices
@@ -46,6 +47,7 @@ class Renderer(View):
         count = len(self.groups.sizes) if self.groups else 0
         return ("group", "group_sample", *UNSHADOWED[:count]) if count else ()
 
+    @turn()
     def frame(self, index: int, seed: int = 0, channels: Sequence[str] = FRAME) -> Frame:
         """One frame at 1 spp: one kernel, only the channels asked for.
 
@@ -71,6 +73,7 @@ class Renderer(View):
         return Frame(index, images, matrices.camera_from_world, matrices.screen_from_world,
                      self.stage.world_from_object())
 
+    @turn()
     def sample_sum(self, index: int, seed: int, part: int, count: int, antialias: bool = False,
                    start: int = 0) -> np.ndarray:
         """Sum of `count` samples of every pixel of a frame, independent between parts.

@@ -66,3 +66,45 @@ def test_the_layout_of_an_array_changes_no_result(name, change):
             image, state = method(replace(frame, index=index), state)
         results.append(image)
     np.testing.assert_array_equal(*results)
+
+
+ARRAYS = {"color": np.ones((6, 8, 3)), "depth": np.full((6, 8), 2.0),
+          "normal": np.tile([0.0, 0.0, -1.0], (6, 8, 1))}
+
+
+def test_plain_arrays_make_a_frame():
+    depth = np.full((6, 8), 2.0)
+    depth[0, :4] = 0, -1, np.inf, np.nan
+    frame = Frame.from_arrays(**{**ARRAYS, "depth": depth}, albedo=np.full((6, 8, 3), 0.5))
+    assert {image.dtype for name, image in frame.images.items() if name != "id"} == {
+        np.dtype(np.float32)}
+    np.testing.assert_array_equal(frame["id"][0], [-1, -1, -1, -1, 0, 0, 0, 0])
+    np.testing.assert_array_equal(frame["motion"], 0)
+    assert frame.world_from_object.shape == (1, 4, 4)
+    assert np.isfinite(frame.screen_from_world).all()
+
+
+def test_matrices_that_are_given_are_taken():
+    camera = np.diag([1.0, -1.0, -1.0, 1.0])
+    frame = Frame.from_arrays(**ARRAYS, id=np.full((6, 8), 3), camera_from_world=camera,
+                              screen_from_world=camera)
+    np.testing.assert_array_equal(frame.camera_from_world, camera)
+    assert "motion" not in frame
+    assert len(frame.world_from_object) == 4
+
+
+@pytest.mark.parametrize(("arrays", "words"), [
+    ({"camera_from_world": np.eye(4)}, "give both, or neither"),
+    ({"colour": np.ones((6, 8, 3))}, "unknown channel 'colour'"),
+    ({"depth": np.ones((6, 8, 1))}, "expected (h, w)"),
+    ({"motion": np.ones((6, 8, 3))}, "expected (h, w, 2)"),
+    ({"normal": np.ones((5, 8, 3))}, "the others are 8x6"),
+    ({"color": "red"}, "use float32"),
+    ({"color": np.ones((6, 8))}, "expected (h, w, 3)"),
+    ({"id": np.full((6, 8), 1 << 20)}, "number objects from 0 on"),
+    ({"id": np.full((6, 8), 0.5)}, "whole numbers"),
+])
+def test_arrays_that_make_no_frame_are_refused(arrays, words):
+    with pytest.raises(InputError) as caught:
+        Frame.from_arrays(**{**ARRAYS, **arrays})
+    assert words in str(caught.value)

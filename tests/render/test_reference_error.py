@@ -16,7 +16,7 @@ from onespp.render.reference_error import (
     next_to_grow,
     standard_error,
 )
-from onespp.render.srgb import srgb_from_linear
+from onespp.show.srgb import srgb_from_linear
 
 H, W = 40, 50
 TRUTH = np.broadcast_to(np.linspace(0.1, 0.6, W)[:, None], (H, W, 3))

@@ -13,6 +13,13 @@ function srgb(x) {
 
 const DISPLAY = Float32Array.from(HALF, srgb);
 
+/** Where the file of an image is: beside the page or, of a page that is one file, in it. */
+function address(key) {
+  const text = window.onesppFiles?.[key];
+  if (text) return URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
+  return `data/${key.split("/").map(encodeURIComponent).join("/")}.js`;
+}
+
 class Images {
   constructor() {
     this.kept = new Map();     // key -> image; the oldest use comes first
@@ -38,7 +45,7 @@ class Images {
     if (image) return Promise.resolve(image);
     if (this.pending.has(key)) return this.pending.get(key).promise;
     if (key.startsWith("flip ")) return this.flip(key);
-    const script = html("script", { src: `data/${key.split("/").map(encodeURIComponent).join("/")}.js` });
+    const script = html("script", { src: address(key) });
     const promise = new Promise((resolve, reject) => {
       this.pending.set(key, { give: resolve });
       script.onerror = () => reject(new Error(`data/${key}.js is missing`));

@@ -14,8 +14,9 @@ from onespp.denoise.metrics.image import non_finite
 from onespp.denoise.metrics.noise_floor import reference_floor
 from onespp.denoise.metrics.perceptual import flip
 from onespp.denoise.metrics.perceptual.ssim import ssim
-from onespp.denoise.metrics.table import HEADLINE, METRICS, measure, spread
+from onespp.denoise.metrics.table import HEADLINE, METRICS, measure
 from onespp.denoise.metrics.tonemap import bytes_from_linear, linear_from_srgb, srgb_from_linear
+from onespp.render.files.frame_ranges import spread
 
 
 def images(seed: int = 0, height: int = 7, width: int = 5) -> tuple[np.ndarray, np.ndarray]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from urllib.parse import parse_qs
 
 import numpy as np
@@ -14,10 +12,8 @@ from onespp.denoise.metrics.perceptual.flip import flip_map
 from onespp.denoise.metrics.tonemap import bytes_from_linear
 from onespp.denoise.report.html import write_report
 from onespp.denoise.score.sequence import score
+from tests.support.browser import chromium
 from tests.support.report_sequence import COUNT, HEIGHT, METHODS, WIDTH, make_report_sequence
-
-playwright = pytest.importorskip(
-    "playwright.sync_api", reason="playwright is not installed: pip install -e '.[dev]'")
 
 READY = '#stage[data-ready="true"]'
 PATIENCE = 120_000  # ms; a slow machine is not a failure
@@ -33,15 +29,8 @@ def report(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def browser():
-    path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),
-                None)
-    if path is None:
-        pytest.skip("there is no Chromium on this machine to open the report in")
-    with playwright.sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=path, args=(
-            ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []))
+    with chromium() as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture

@@ -11,7 +11,8 @@ from click.testing import CliRunner
 
 import onespp.cli
 from onespp.denoise.score.compare import comparison, parse_thresholds, standard_error
-from onespp.denoise.score.scorecard import FrameScore, MethodScore, Scores
+from onespp.denoise.score.method_score import FrameScore, MethodScore
+from onespp.denoise.score.scorecard import Scores
 from onespp.render.errors import InputError
 
 N = 40

@@ -10,7 +10,8 @@ from click.testing import CliRunner
 
 from onespp.cli.lead import lead as lead_command
 from onespp.denoise.peers import oidn
-from onespp.denoise.score.scorecard import ClassScore, Scores
+from onespp.denoise.score.method_score import ClassScore
+from onespp.denoise.score.scorecard import Scores
 from onespp.denoise.score.sequence import score
 from onespp.denoise.studies.lead import OIDN_FORMS
 from onespp.denoise.studies.suite import Group, class_leads, groups, lead, markdown

@@ -1,0 +1,1 @@
+"""The functions of `import onespp`, which the command line calls too."""

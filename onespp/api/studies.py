@@ -1,0 +1,69 @@
+"""What studies of many scenes do with each one: render what is missing, make it plain, judge it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from onespp.denoise.catalog import Method
+from onespp.denoise.studies.hard_scenes import Row, judge
+from onespp.render.files.lock import writing
+from onespp.render.files.sequence import FrameSequence
+from onespp.render.games202.convert import export_games202, import_games202
+from onespp.render.progress import Progress
+from onespp.scenes.hard import HARD
+
+
+def judge_hard(name: str, methods: Mapping[str, Method], folder: Path, reference_spp: int,
+               progress: Progress, tell: Callable[[str], None]) -> list[Row]:
+    """Render a hard scene into a folder, where it is missing, and try methods on it.
+
+    Args:
+        tell: told what to know of its references.
+
+    Raises:
+        InputError: the folder holds something else.
+    """
+    from onespp.render.job import RenderJob, render_sequence  # imports Mitsuba
+    from onespp.render.references import reference_notes
+
+    hard = HARD[name]
+    scene = hard.make()
+    job = RenderJob(scene, range(scene.frames), scene.height, scene.width,
+                    reference_spp=reference_spp)
+    needed = {channel for method in methods.values() for channel in method.needs}
+    job = replace(job, channels=tuple(dict.fromkeys((*job.channel_names(), *sorted(needed)))))
+    sequence = render_sequence(job, folder, progress=progress)
+    for note in reference_notes(sequence, sequence.frames, reference_spp):
+        tell(note)
+    return judge(sequence, name, hard.event, hard.diffuse, progress, methods)
+
+
+def without_results(sequence: FrameSequence, method: str, peers: tuple[str, ...]) -> list[str]:
+    """What to denoise by: peers that lack results of some frame, and the method in any case, for
+    it is what changes from one time to the next."""
+    missing = [peer for peer in peers if peer == method or not all(
+        sequence.has_result(peer, i) for i in sequence.frames)]
+    return [*missing, *({method} - {*missing})]
+
+
+def plain_copy(sequence: FrameSequence, folder: Path, command: str = "") -> FrameSequence:
+    """The frames exported to the assignment's layout and imported into `folder`, with the
+    references of the original; what is there is kept.
+
+    Args:
+        command: the command line, for the manifest.
+    """
+    there = (folder / "manifest.json").exists()
+    if not there or not all(map((kept := FrameSequence.open(folder)).has_frame, kept.frames)):
+        files = sequence.folder / "games202"
+        export_games202(sequence, files)
+        with writing(folder, "render", alone=there):
+            import_games202(files, folder, fps=sequence.manifest.fps, overwrite=there,
+                            command=command)
+    plain = FrameSequence.open(folder)
+    for k, i in zip(plain.frames, sequence.frames, strict=True):
+        if not plain.has_reference(k):
+            plain.write_reference(k, sequence.read_reference(i))
+    return plain.with_reference_spp()
