@@ -10,8 +10,8 @@ import pytest
 
 from onespp.render.channels import FRAME
 from onespp.render.errors import InputError
-from onespp.render.mitsuba.variant import mi
 from onespp.render.host import backend
+from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 from onespp.scenes.description import Camera, Mesh, Rectangle, Scene, SceneError, Shape, Sphere
