@@ -175,8 +175,8 @@ class UserFile(UserCode):
         """Of the file and of those beside it that it imported."""
         found = hashlib.sha256(data)
         for name in sorted(set(sys.modules) | set(self._apart)):
-            place = getattr(sys.modules.get(name), "__file__", None)
-            if place and name != self.module.__name__ and self._owns(place, name):
+            place = next(_of(sys.modules.get(name)), None)
+            if place and Path(place).is_file() and name != self.module.__name__ and self._owns(place, name):
                 found.update(Path(place).read_bytes())
         return found.hexdigest()[:16]
 
@@ -230,10 +230,14 @@ class UserFile(UserCode):
                 f"{self.module.__name__.replace('_', ' ')}: give yours another name)")
 
 
-def _of(module: ModuleType) -> Iterator[str]:
-    """Where a module lies; a package of no file, in which folders."""
-    yield from (place for place in (getattr(module, "__file__", None),
-                                    *(getattr(module, "__path__", None) or ())) if place)
+def _of(module: Any) -> Iterator[str]:
+    """Where a module lies; a package of no file, in which folders.
+
+    A module may make up attributes that it has not (`torch.classes` does).
+    """
+    own = getattr(module, "__dict__", {})
+    folders = own.get("__path__") or ()
+    yield from (place for place in (own.get("__file__"), *folders) if isinstance(place, str))
 
 
 def _is_file(path: Path) -> bool:

@@ -167,6 +167,29 @@ def test_a_model_that_cannot_be_copied_is_never_copied(write, sequence, call):
     assert sequence.read_run("my_filter").parameters == {"strength": 0.5}
 
 
+def test_modules_that_make_up_attributes_are_borne(write):
+    """As `torch.classes`, which comes with the first network."""
+    path = write("""
+import sys, types
+
+class Odd(types.ModuleType):
+    def __getattr__(self, name):
+        return Odd(name)
+
+sys.modules["odd_one"] = Odd("odd_one")
+
+class Half:
+    needs = ("color",)
+
+    def __call__(self, frame, state):
+        return frame["color"] / 2, state
+""")
+    try:
+        np.testing.assert_allclose(once(build(path)), make_frame(6, 8)["color"] / 2)
+    finally:
+        sys.modules.pop("odd_one", None)
+
+
 def test_a_torch_module_is_no_method_but_what_uses_it_is(write):
     pytest.importorskip("torch")
     path = write("""
