@@ -174,9 +174,9 @@ class UserFile(UserCode):
     def _hash(self, data: bytes) -> str:
         """Of the file and of those beside it that it imported."""
         found = hashlib.sha256(data)
-        for name in sorted(set(sys.modules) | set(self._apart)):
+        for name in sorted((set(sys.modules) | set(self._apart)) - {self.module.__name__}):
             place = next(_of(sys.modules.get(name)), None)
-            if place and Path(place).is_file() and name != self.module.__name__ and self._owns(place, name):
+            if place and self._owns(place, name) and Path(place).is_file():
                 found.update(Path(place).read_bytes())
         return found.hexdigest()[:16]
 
