@@ -32,6 +32,9 @@ from onespp.denoise.methods.parameters import renamed_parameters, with_present_n
 from onespp.denoise.methods.separable import BilateralSeparable
 from onespp.denoise.methods.svgf import Svgf
 from onespp.denoise.methods.temporal import Temporal
+from onespp.denoise.methods.unguided.bilateral_color import BilateralColor
+from onespp.denoise.methods.unguided.gaussian import Gaussian
+from onespp.denoise.methods.unguided.gaussian_separable import GaussianSeparable
 from onespp.denoise.own_method import OwnMethod, from_file, installed, offers
 from onespp.denoise.peers.oidn import Oidn
 from onespp.denoise.peers.oidn_split import OidnSplit
@@ -75,6 +78,9 @@ class Method(Protocol[State]):
 
 
 METHODS: Mapping[str, type] = MappingProxyType({
+    "gaussian": Gaussian,
+    "gaussian-separable": GaussianSeparable,
+    "bilateral-color": BilateralColor,
     "bilateral": Bilateral,
     "bilateral-separable": BilateralSeparable,
     "atrous": Atrous,

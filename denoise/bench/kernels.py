@@ -45,7 +45,7 @@ from .probe_frames import probe
 
 WARM_UP, FRAMES = 3, 4
 CROP = (40, 56)  # height, width of the frames for the error
-_BILATERAL_TAP, _ATROUS_TAP = 63, 42  # operations, an FMA being two
+_GAUSSIAN_TAP, _COLOR_TAP, _BILATERAL_TAP, _ATROUS_TAP = 9, 30, 63, 42  # operations, an FMA being two
 
 
 @dataclass(frozen=True)
@@ -81,6 +81,12 @@ def _both(a: tuple[int, int], b: tuple[int, int]) -> tuple[int, int]:
 
 
 KERNELS = {
+    "gaussian": Kernel(lambda _, frame: oracles.gaussian(frame),
+                       25 * 25 * _GAUSSIAN_TAP, 4 * 25 * 12),
+    "gaussian-separable": Kernel(lambda _, frame: oracles.gaussian(frame),
+                                 2 * 25 * _GAUSSIAN_TAP, 4 * 2 * 14),
+    "bilateral-color": Kernel(lambda _, frame: oracles.bilateral_color(frame),
+                              33 * 33 * _COLOR_TAP, 4 * 33 * 14),
     "bilateral": Kernel(lambda _, frame: oracles.bilateral(frame), *_BILATERAL),
     "bilateral-separable": Kernel(lambda _, frame: oracles.bilateral_separable(frame),
                                   2 * 33 * _BILATERAL_TAP, 4 * 2 * 31),
