@@ -121,9 +121,9 @@ def test_one_and_two_threads_give_the_same(kind):
 
 
 @pytest.mark.parametrize(("kind", "parameters"), [
-    (Gaussian, {"radius": 0}), (Gaussian, {"sigma_coord": 0.0}), (GaussianSeparable, {"radius": 65}),
-    (BilateralColor, {"radius": 2.5}), (BilateralColor, {"sigma_color": -1.0}),
-    (BilateralColor, {"sigma_coord": float("nan")})])
+    (Gaussian, {"radius": 0}), (Gaussian, {"sigma_coord": 0.0}),
+    (GaussianSeparable, {"radius": 65}), (BilateralColor, {"radius": 2.5}),
+    (BilateralColor, {"sigma_color": -1.0}), (BilateralColor, {"sigma_coord": float("nan")})])
 def test_bad_parameters_are_refused(kind, parameters):
     with pytest.raises(InputError, match=next(iter(parameters))):
         kind(**parameters)
