@@ -150,8 +150,8 @@ class Ladder:
 
     def section(self, number: int, rung: Rung) -> str:
         picture = self.image(rung.method, f"{rung.method} and its error")
-        measured = (f"{self.decibels(rung.method)} dB, and {self.cost(rung.method)} times the time of "
-                    f"`{self.times.ratio_to}`.")
+        measured = (f"{self.decibels(rung.method)} dB, and {self.cost(rung.method)} times the time "
+                    f"of `{self.times.ratio_to}`.")
         return "\n\n".join((f"## {number}. `{rung.method}`", textwrap.fill(rung.idea, 100),
                             picture, measured,
                             textwrap.fill(f"**What fails.** {rung.fails}", 100)))
