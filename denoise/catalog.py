@@ -22,6 +22,8 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from onespp.denoise.inputs.demodulation import CHANNELS as TEXTURE
+from onespp.denoise.methods.antialiasing.innovation_taa import InnovationTaa
+from onespp.denoise.methods.antialiasing.taa import Taa
 from onespp.denoise.methods.assignment import Assignment, AssignmentAtrous
 from onespp.denoise.methods.asvgf import Asvgf
 from onespp.denoise.methods.atrous import Atrous
@@ -85,11 +87,13 @@ METHODS: Mapping[str, type] = MappingProxyType({
     "bilateral-separable": BilateralSeparable,
     "atrous": Atrous,
     "temporal": Temporal,
+    "taa": Taa,
     "assignment": Assignment,
     "assignment-atrous": AssignmentAtrous,
     "svgf": Svgf,
     "asvgf": Asvgf,
     "onespp": FilteredInnovation,
+    "onespp-taa": InnovationTaa,
 })
 
 

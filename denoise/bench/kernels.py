@@ -34,6 +34,7 @@ from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
 from onespp.denoise.oracles import filtered_innovation as innovation_oracle
 from onespp.denoise.oracles import filters as oracles
 from onespp.denoise.oracles import svgf as svgf_oracles
+from onespp.denoise.oracles.taa import taa
 from onespp.denoise.peers.oidn import AVAILABLE, Oidn
 from onespp.render.frame import Frame
 from onespp.render.host import backend
@@ -71,6 +72,12 @@ def _accumulated(previous: Frame, frame: Frame, old: np.ndarray, new: np.ndarray
     return oracles.accumulate(new, oracles.reproject_bilinear(previous, frame, old))
 
 
+def _innovations(*frames: Frame) -> list[np.ndarray]:
+    """Our filter's image of each frame."""
+    return [innovation_oracle.run(list(frames[:n + 1]), FilteredInnovation())
+            for n in range(len(frames))]
+
+
 _ATROUS = (5 * (24 * _ATROUS_TAP + 17) + 48 * 12, 4 * (5 * 27 + 38))
 _TEMPORAL = (660, 4 * 51)
 
@@ -94,6 +101,7 @@ KERNELS = {
     "atrous": Kernel(lambda _, frame: oracles.atrous(frame), *_ATROUS),
     "temporal": Kernel(lambda previous, frame: _accumulated(
         previous, frame, previous["color"], frame["color"]), *_TEMPORAL),
+    "taa": Kernel(lambda *frames: taa(frames)),
     "assignment": Kernel(lambda previous, frame: _accumulated(
         previous, frame, oracles.bilateral(previous), oracles.bilateral(frame)),
         *_both(_BILATERAL, _TEMPORAL)),
@@ -104,6 +112,7 @@ KERNELS = {
     "asvgf": Kernel(lambda *frames: svgf_oracles.asvgf(list(frames)), textured=True),
     "onespp": Kernel(lambda *frames: innovation_oracle.run(list(frames), FilteredInnovation()),
                      textured=True),
+    "onespp-taa": Kernel(lambda *frames: taa(frames, _innovations(*frames)), textured=True),
 }
 
 

@@ -38,7 +38,8 @@ def render_to(scene_name: str, out: Path | None, *, frames: str | None = None,
               size: str | None = None, seed: int = 0, reference_spp: int | None = None,
               reference_error: float | None = None, antialias: bool = False,
               channels: str | None = None, half: bool = False, direct: str = "resampled",
-              sampler: str = "zsobol", overwrite: bool = False) -> FrameSequence:
+              sampler: str = "zsobol", jitter: str = "none",
+              overwrite: bool = False) -> FrameSequence:
     """Do what the options of a command ask."""
     scene = catalog.load(scene_name)
     height, width = parse_size(size) if size is not None else (scene.height, scene.width)
@@ -52,7 +53,7 @@ def render_to(scene_name: str, out: Path | None, *, frames: str | None = None,
 
     job = RenderJob(scene, numbers, height, width, seed, reference_spp, antialias, names,
                     direct, sampler, command_line(), added, channels == "training",
-                    half, reference_error)
+                    half, reference_error, jitter)
     out = out or Path("data") / scene.name
     with writing(out, "render", alone=overwrite), progress() as report:
         sequence = render_sequence(job, out, overwrite=overwrite, progress=report, tell=note)
