@@ -14,7 +14,7 @@ from .filters import previous_screen
 YCOCG = np.array([[0.25, 0.5, 0.25], [0.5, 0, -0.5], [-0.25, 0.5, -0.25]])
 
 
-def taa(frames: Sequence[Frame], colors: Sequence[np.ndarray] | None = None, alpha: float = 0.1,
+def taa(frames: Sequence[Frame], colors: Sequence[np.ndarray] | None = None, alpha: float = 0.2,
         k: float = 1.0) -> np.ndarray:
     """(h, w, 3) of the last frame; colors: what is blended, instead of the frames' own."""
     images = [np.asarray(c, np.float64) for c in colors or [f["color"] for f in frames]]

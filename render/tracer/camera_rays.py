@@ -24,7 +24,7 @@ from onespp.scenes.description import Camera
 
 Offset = tuple[float, float]
 NO_JITTER: Offset = (0.0, 0.0)
-PERIOD = 16  # frames after which offsets repeat: as many as a history of alpha 0.1 holds
+PERIOD = 16  # frames after which offsets repeat: what went before weighs little then
 
 
 def halton(frame: int) -> Offset:

@@ -28,7 +28,7 @@ class InnovationTaa(Filtered[RecordState[Passes], TaaState]):
         history: the second stage, a `Taa`.
 
     Example, with `frame` a `Frame` of 12x16 pixels:
-        >>> method = InnovationTaa(history=Taa(alpha=0.2))
+        >>> method = InnovationTaa(history=Taa(alpha=0.1))
         >>> image, state = method(frame, method.init(12, 16))
         >>> image.shape, image.dtype
         ((12, 16, 3), dtype('float32'))
