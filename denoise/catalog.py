@@ -22,6 +22,8 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from onespp.denoise.inputs.demodulation import CHANNELS as TEXTURE
+from onespp.denoise.methods.antialiasing.innovation_taa import InnovationTaa
+from onespp.denoise.methods.antialiasing.taa import Taa
 from onespp.denoise.methods.assignment import Assignment, AssignmentAtrous
 from onespp.denoise.methods.asvgf import Asvgf
 from onespp.denoise.methods.atrous import Atrous
@@ -32,6 +34,9 @@ from onespp.denoise.methods.parameters import renamed_parameters, with_present_n
 from onespp.denoise.methods.separable import BilateralSeparable
 from onespp.denoise.methods.svgf import Svgf
 from onespp.denoise.methods.temporal import Temporal
+from onespp.denoise.methods.unguided.bilateral_color import BilateralColor
+from onespp.denoise.methods.unguided.gaussian import Gaussian
+from onespp.denoise.methods.unguided.gaussian_separable import GaussianSeparable
 from onespp.denoise.own_method import OwnMethod, from_file, installed, offers
 from onespp.denoise.peers.oidn import Oidn
 from onespp.denoise.peers.oidn_split import OidnSplit
@@ -75,15 +80,20 @@ class Method(Protocol[State]):
 
 
 METHODS: Mapping[str, type] = MappingProxyType({
+    "gaussian": Gaussian,
+    "gaussian-separable": GaussianSeparable,
+    "bilateral-color": BilateralColor,
     "bilateral": Bilateral,
     "bilateral-separable": BilateralSeparable,
     "atrous": Atrous,
     "temporal": Temporal,
+    "taa": Taa,
     "assignment": Assignment,
     "assignment-atrous": AssignmentAtrous,
     "svgf": Svgf,
     "asvgf": Asvgf,
     "onespp": FilteredInnovation,
+    "onespp-taa": InnovationTaa,
 })
 
 

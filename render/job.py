@@ -45,6 +45,8 @@ class RenderJob:
         direct, sampler: the estimator of direct light and the random numbers of the frames, see
             `render/renderer.py`. (References always compare candidates
             and are always Sobol.)
+        jitter: "halton" moves all rays of a frame by an offset of its own within the pixel, see
+            `tracer/camera_rays.py`; "none" sends them through centres.
         command: the command line, for the manifest.
     """
 
@@ -63,12 +65,13 @@ class RenderJob:
     training: bool = False
     half: bool = False
     reference_error: float | None = None
+    jitter: str = "none"
 
     @cached_property
     @turn()
     def renderer(self) -> Renderer:
         return Renderer(self.scene, self.height, self.width, direct=self.direct,
-                        sampler=self.sampler)
+                        sampler=self.sampler, jitter=self.jitter)
 
     @property
     def fewest_spp(self) -> int | None:
@@ -101,7 +104,7 @@ class RenderJob:
             later=later_fingerprints(self.scene, self.frames), frames=tuple(self.frames),
             width=self.width, height=self.height, fps=self.scene.fps,
             seed=self.seed, reference_spp=self.fewest_spp, max_depth=self.scene.max_depth,
-            direct=self.direct, sampler=self.sampler,
+            direct=self.direct, sampler=self.sampler, jitter=self.jitter,
             reference_filter="box" if self.antialias else "centre",
             channels=self.channel_names(), half=self.half, objects=self.scene.object_names,
             device=backend.choose(), machine=machine(backend.choose()),

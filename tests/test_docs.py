@@ -16,6 +16,7 @@ from types import ModuleType
 import click
 import draw_architecture
 import from_code
+import ladder
 import pytest
 import results
 from sphinx.cmd.build import build_main
@@ -303,6 +304,8 @@ def check_command(words: list[str]) -> None:
         assert {w for w in rest if "=" not in w} <= set(targets), words
     elif program == "python" and rest[0] == "docs/results.py":
         parse(results.results, rest[1:])
+    elif program == "python" and rest[0] == "docs/ladder.py":
+        parse(ladder.ladder, rest[1:])
     elif program in ("python", "pytest"):
         assert all((ROOT / w).is_file() for w in rest if w.endswith(".py")), words
     else:
@@ -401,6 +404,20 @@ def test_every_block_of_results_has_a_part_and_every_part_a_block():
     for path in (ROOT / "README.md", DOCS / "results.md"):
         found = re.findall(r"<!-- results:([\w-]+) -->", path.read_text("utf-8"))
         assert found == [name for name, (where, _) in results.PARTS.items() if where == path]
+
+
+def test_the_ladder_is_what_its_command_writes_but_for_the_numbers(tmp_path):
+    ladder.ladder.main(["--frames", "0:2", "--size", "24x24", "--reference-spp", "4",
+                        "--rounds", "1", "--data", str(tmp_path / "data"), "--out", str(tmp_path)],
+                       standalone_mode=False)
+    number = re.compile(r"\d[\d.:]*(?:e[+-]\d+)?")
+    made, kept = (number.sub("#", (folder / "ladder.md").read_text("utf-8"))
+                  for folder in (tmp_path, DOCS))
+    assert made == kept
+    names = {path.name for path in (tmp_path / "ladder").iterdir()}
+    assert names == {path.name for path in (DOCS / "ladder").iterdir()}
+    assert names == {"input.jpg", "scale.jpg", *(f"{rung.method}.jpg" for rung in ladder.RUNGS)}
+    assert sum(path.stat().st_size for path in (DOCS / "ladder").iterdir()) < 150_000
 
 
 @pytest.fixture

@@ -34,6 +34,7 @@ from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
 from onespp.denoise.oracles import filtered_innovation as innovation_oracle
 from onespp.denoise.oracles import filters as oracles
 from onespp.denoise.oracles import svgf as svgf_oracles
+from onespp.denoise.oracles.taa import taa
 from onespp.denoise.peers.oidn import AVAILABLE, Oidn
 from onespp.render.frame import Frame
 from onespp.render.host import backend
@@ -45,7 +46,8 @@ from .probe_frames import probe
 
 WARM_UP, FRAMES = 3, 4
 CROP = (40, 56)  # height, width of the frames for the error
-_BILATERAL_TAP, _ATROUS_TAP = 63, 42  # operations, an FMA being two
+_GAUSSIAN_TAP, _COLOR_TAP = 9, 30  # operations, an FMA being two
+_BILATERAL_TAP, _ATROUS_TAP = 63, 42
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,12 @@ def _accumulated(previous: Frame, frame: Frame, old: np.ndarray, new: np.ndarray
     return oracles.accumulate(new, oracles.reproject_bilinear(previous, frame, old))
 
 
+def _innovations(*frames: Frame) -> list[np.ndarray]:
+    """Our filter's image of each frame."""
+    return [innovation_oracle.run(list(frames[:n + 1]), FilteredInnovation())
+            for n in range(len(frames))]
+
+
 _ATROUS = (5 * (24 * _ATROUS_TAP + 17) + 48 * 12, 4 * (5 * 27 + 38))
 _TEMPORAL = (660, 4 * 51)
 
@@ -81,12 +89,19 @@ def _both(a: tuple[int, int], b: tuple[int, int]) -> tuple[int, int]:
 
 
 KERNELS = {
+    "gaussian": Kernel(lambda _, frame: oracles.gaussian(frame),
+                       25 * 25 * _GAUSSIAN_TAP, 4 * 25 * 12),
+    "gaussian-separable": Kernel(lambda _, frame: oracles.gaussian(frame),
+                                 2 * 25 * _GAUSSIAN_TAP, 4 * 2 * 14),
+    "bilateral-color": Kernel(lambda _, frame: oracles.bilateral_color(frame),
+                              33 * 33 * _COLOR_TAP, 4 * 33 * 14),
     "bilateral": Kernel(lambda _, frame: oracles.bilateral(frame), *_BILATERAL),
     "bilateral-separable": Kernel(lambda _, frame: oracles.bilateral_separable(frame),
                                   2 * 33 * _BILATERAL_TAP, 4 * 2 * 31),
     "atrous": Kernel(lambda _, frame: oracles.atrous(frame), *_ATROUS),
     "temporal": Kernel(lambda previous, frame: _accumulated(
         previous, frame, previous["color"], frame["color"]), *_TEMPORAL),
+    "taa": Kernel(lambda *frames: taa(frames)),
     "assignment": Kernel(lambda previous, frame: _accumulated(
         previous, frame, oracles.bilateral(previous), oracles.bilateral(frame)),
         *_both(_BILATERAL, _TEMPORAL)),
@@ -97,6 +112,7 @@ KERNELS = {
     "asvgf": Kernel(lambda *frames: svgf_oracles.asvgf(list(frames)), textured=True),
     "onespp": Kernel(lambda *frames: innovation_oracle.run(list(frames), FilteredInnovation()),
                      textured=True),
+    "onespp-taa": Kernel(lambda *frames: taa(frames, _innovations(*frames)), textured=True),
 }
 
 

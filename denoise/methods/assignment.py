@@ -10,7 +10,7 @@ Departures: those of the two stages (`bilateral.py` or `atrous.py`, and `tempora
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Generic
+from typing import Generic, TypeVar
 
 from onespp.denoise.inputs.surface import Surface
 from onespp.denoise.jit.arrays import Color
@@ -18,43 +18,46 @@ from onespp.denoise.jit.grid import Stencil
 from onespp.render.frame import Frame
 
 from .atrous import Atrous, AtrousState
-from .base import OnLanes, State
+from .base import OnLanes, OnStencil, State
 from .bilateral import Bilateral, BilateralState
 from .temporal import Temporal, TemporalState
 
+Second = TypeVar("Second", bound=OnStencil)
+
 
 @dataclass(frozen=True)
-class FilteredState(Generic[State]):
+class FilteredState(Generic[State, Second]):
     """State of the filter and of the accumulation, on one stencil."""
 
     stencil: Stencil
     filter: State
-    history: TemporalState
+    history: Second
 
 
 @dataclass(frozen=True)
-class _Filtered(OnLanes[FilteredState[State]], Generic[State]):
-    """Filter, then accumulate: what both variants share."""
+class Filtered(OnLanes[FilteredState[State, Second]], Generic[State, Second]):
+    """Filter, then accumulate: what the variants share."""
 
     filter: OnLanes[State]
-    history: Temporal
+    history: OnLanes[Second]
 
     @property
     def reach(self) -> int:
         return max(self.filter.reach, self.history.reach)
 
-    def init_on(self, stencil: Stencil) -> FilteredState[State]:
+    def init_on(self, stencil: Stencil) -> FilteredState[State, Second]:
         return FilteredState(stencil, self.filter.init_on(stencil), self.history.init_on(stencil))
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,
-                 state: FilteredState[State]) -> tuple[Color, FilteredState[State]]:
-        filtered, _ = self.filter.on_lanes(frame, color, surface, state.filter)
+                 state: FilteredState[State, Second]
+                 ) -> tuple[Color, FilteredState[State, Second]]:
+        filtered, after = self.filter.on_lanes(frame, color, surface, state.filter)
         result, history = self.history.on_lanes(frame, filtered, surface, state.history)
-        return result, replace(state, history=history)
+        return result, replace(state, filter=after, history=history)
 
 
 @dataclass(frozen=True)
-class Assignment(_Filtered[BilateralState]):
+class Assignment(Filtered[BilateralState, TemporalState]):
     """Joint bilateral filter, then clamped accumulation: the assignment as set.
 
     Attributes:
@@ -73,7 +76,7 @@ class Assignment(_Filtered[BilateralState]):
 
 
 @dataclass(frozen=True)
-class AssignmentAtrous(_Filtered[AtrousState]):
+class AssignmentAtrous(Filtered[AtrousState, TemporalState]):
     """A-trous filter, then clamped accumulation: the assignment's bonus task, done as published.
 
     Attributes:

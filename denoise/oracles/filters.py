@@ -41,10 +41,47 @@ def read(frame: Frame, **more: np.ndarray) -> Pixels:
                   z=frame["depth"], surface=surface, **more)
 
 
+def gaussian(frame: Frame, radius: int = 12, sigma_coord: float = 4) -> np.ndarray:
+    """G over a square window; see denoise/methods/unguided/gaussian.py."""
+    def g(dy: int, dx: int, p: Pixels, q: Pixels) -> np.ndarray:
+        return np.exp(-(dy**2 + dx**2) / (2 * sigma_coord**2) * np.ones_like(p.z))
+
+    return weighted_mean(read(frame, c=frame["color"]), square(radius), g)
+
+
+def bilateral_color(frame: Frame, radius: int = 16, sigma_coord: float = 32,
+                    sigma_color: float = 0.6) -> np.ndarray:
+    """B over a square window; see denoise/methods/unguided/bilateral_color.py."""
+    def b(dy: int, dx: int, p: Pixels, q: Pixels) -> np.ndarray:
+        return np.exp(-(dy**2 + dx**2) / (2 * sigma_coord**2)
+                      - ((p.c - q.c)**2).sum(-1) / (2 * sigma_color**2))
+
+    return weighted_mean(read(frame, c=frame["color"]), square(radius), b)
+
+
+def square(radius: int) -> list[tuple[int, int]]:
+    """Offsets of a square window, row by row."""
+    side = range(-radius, radius + 1)
+    return [(dy, dx) for dy in side for dx in side]
+
+
+def weighted_mean(pixels: Pixels, offsets: list[tuple[int, int]], weight: Weight) -> np.ndarray:
+    """Mean of the colour c over taps, weighed by weight(dy, dx, p, q)."""
+    shape = pixels.c.shape[:2]
+    total, weights = np.zeros((*shape, 3)), np.zeros(shape)
+    for dy, dx in offsets:
+        where, p, q = pairs(pixels, shape, dy, dx)
+        if where is None:
+            continue
+        w = weight(dy, dx, p, q)
+        total[where] += w[..., None] * q.c
+        weights[where] += w
+    return total / weights[..., None]
+
+
 def bilateral(frame: Frame, radius: int = 16, **sigmas: float) -> np.ndarray:
     """The assignment's J; see denoise/bilateral.py."""
-    side = range(-radius, radius + 1)
-    return joint_mean(frame, frame["color"], [(dy, dx) for dy in side for dx in side], **sigmas)
+    return joint_mean(frame, frame["color"], square(radius), **sigmas)
 
 
 def bilateral_separable(frame: Frame, radius: int = 16, **sigmas: float) -> np.ndarray:
@@ -58,12 +95,7 @@ def joint_mean(frame: Frame, color: np.ndarray, offsets: list[tuple[int, int]],
                sigma_coord: float = 32, sigma_color: float = 0.6, sigma_normal: float = 0.1,
                sigma_plane: float = 0.1) -> np.ndarray:
     """Mean of a colour over taps, weighed by the assignment's J."""
-    pixels, shape = read(frame, c=color), frame["id"].shape
-    total, weights = np.zeros((*shape, 3)), np.zeros(shape)
-    for dy, dx in offsets:
-        where, p, q = pairs(pixels, shape, dy, dx)
-        if where is None:
-            continue
+    def weight(dy: int, dx: int, p: Pixels, q: Pixels) -> np.ndarray:
         both = (p.surface > 0) & (q.surface > 0)
         cosine = np.where(both, (p.n * q.n).sum(-1), 1).clip(-1, 1)
         d = q.position - p.position
@@ -74,10 +106,9 @@ def joint_mean(frame: Frame, color: np.ndarray, offsets: list[tuple[int, int]],
                    - ((p.c - q.c)**2).sum(-1) / (2 * sigma_color**2)
                    - np.arccos(cosine)**2 / (2 * sigma_normal**2)
                    - sine**2 / (2 * sigma_plane**2))
-        j = np.where(p.surface == q.surface, j, 0)
-        total[where] += j[..., None] * q.c
-        weights[where] += j
-    return total / weights[..., None]
+        return np.where(p.surface == q.surface, j, 0)
+
+    return weighted_mean(read(frame, c=color), offsets, weight)
 
 
 def luminance(color: np.ndarray) -> np.ndarray:

@@ -32,7 +32,7 @@ def render(scene: str | Path | Scene, out: Path | str | None = None, *,
            seed: int = 0, reference_spp: int | None = None, reference_error: float | None = None,
            antialias: bool = False, channels: str | Iterable[str] | None = None,
            half: bool = False, direct: str = "resampled", sampler: str = "zsobol",
-           overwrite: bool = False) -> FrameSequence:
+           jitter: str = "none", overwrite: bool = False) -> FrameSequence:
     """Render frames of a scene at one sample a pixel.
 
     What the folder holds already is not rendered again: the same call goes on where it was stopped.
@@ -54,6 +54,8 @@ def render(scene: str | Path | Scene, out: Path | str | None = None, *,
         half: store radiance and guides in half precision.
         direct: "resampled" (all lights, with visibility apart) or "mis", as Mitsuba's path.
         sampler: "zsobol", "bluenoise" or "pcg".
+        jitter: "halton" moves all rays of a frame by an offset of its own within the pixel, for
+            temporal anti-aliasing (compare with references of `antialias`); "none".
         overwrite: replace another sequence in the folder.
 
     Returns:
@@ -78,6 +80,7 @@ def render(scene: str | Path | Scene, out: Path | str | None = None, *,
         raise InputError(f"--seed is {seed}: use 0 or more")
     _check_choice("direct", direct, ("mis", "resampled"))
     _check_choice("sampler", sampler, ("pcg", "zsobol", "bluenoise"))
+    _check_choice("jitter", jitter, ("none", "halton"))
     require_memory(height, width)
     text = channels if channels is None or isinstance(channels, str) else ",".join(channels)
     names, added = asked_channels(text)
@@ -88,7 +91,7 @@ def render(scene: str | Path | Scene, out: Path | str | None = None, *,
     who = caller()
     job = RenderJob(made, numbers, height, width, seed, reference_spp, antialias, names,
                     direct, sampler, who.command(), added, text == "training",
-                    half, reference_error)
+                    half, reference_error, jitter)
     folder = _temporary() if out is None else Path(out)
     with writing(folder, "render", alone=overwrite), who.progress() as report:
         sequence = render_sequence(job, folder, overwrite=overwrite, progress=report, tell=who.tell)

@@ -60,6 +60,10 @@ def render_options(command):
         click.option("--sampler", default="zsobol", show_default=True,
                      type=click.Choice(["pcg", "zsobol", "bluenoise"]),
                      help="Random numbers: independent, or with blue-noise error (two kinds)."),
+        click.option("--jitter", default="none", show_default=True,
+                     type=click.Choice(["none", "halton"]),
+                     help="Move all rays of a frame by an offset of its own within the pixel, for "
+                          "temporal anti-aliasing; compare with a reference of --antialias."),
         overwrite_option, device_option, threads_option,
     )):
         command = option(command)

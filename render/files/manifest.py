@@ -36,7 +36,7 @@ Size = Annotated[int, Field(ge=1, le=1 << 16)]
 Name = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]+$")]
 
 
-_UNKNOWN = ("spp", "max_depth", "direct", "sampler", "reference_filter")  # of an import
+_UNKNOWN = ("spp", "max_depth", "direct", "sampler", "jitter", "reference_filter")  # of an import
 
 
 class Manifest(JsonFile):
@@ -45,12 +45,13 @@ class Manifest(JsonFile):
     `reference_spp` is the fewest samples that a reference has (while they are rendered: is to
     have), None where there is none; `reference_filter` is "centre" where samples go through pixel
     centres, as a frame's do, "box" where they are spread over the pixel.
-    `seed`, `spp`, `max_depth`, `direct`, `sampler` and `reference_filter` are None for imports,
-    where nobody knows them (older versions wrote defaults there, which are not read). `objects`
-    are names in order of ID. `fingerprint` is a hash of what the scene describes (or an import
-    holds), so that an edited scene is not taken for the old one; `later` has hashes of frames
-    after the scene's last one, by their number. `commands` are the command lines that made it, as
-    they were typed, in order; `machine` is that of the first.
+    `jitter` says how far a frame's rays are from centres: "none", or "halton" for an offset a
+    frame, which its matrices contain. `seed`, `spp`, `max_depth`, `direct`, `sampler`, `jitter` and
+    `reference_filter` are None for imports, where nobody knows them (older versions wrote defaults
+    there, which are not read). `objects` are names in order of ID. `fingerprint` is a hash of what
+    the scene describes (or an import holds), so that an edited scene is not taken for the old one;
+    `later` has hashes of frames after the scene's last one, by their number. `commands` are the
+    command lines that made it, as they were typed, in order; `machine` is that of the first.
     """
 
     model_config = ConfigDict(validate_default=True)
@@ -71,6 +72,7 @@ class Manifest(JsonFile):
     max_depth: Annotated[int, Field(ge=1)] | None = None
     direct: Name | None = "mis"
     sampler: Name | None = "pcg"
+    jitter: Literal["none", "halton"] | None = "none"
     channels: Annotated[tuple[str, ...], Field(min_length=1)]
     half: bool = False
     objects: Annotated[tuple[Name, ...], Field(min_length=1)]
@@ -104,7 +106,7 @@ class Manifest(JsonFile):
 
 # What two manifests of the same sequence have in common. The rest may change from run to run.
 _IDENTITY = ("source", "scene", "fingerprint", "width", "height", "fps", "seed", "spp",
-             "max_depth", "direct", "sampler", "channels", "half", "objects")
+             "max_depth", "direct", "sampler", "jitter", "channels", "half", "objects")
 
 
 def first_difference(a: Manifest, b: Manifest) -> str | None:

@@ -2,6 +2,13 @@
 
 One ray a pixel, through the pixel's centre: frames, G-buffers and references that pass through
 the same points agree exactly, so that a score measures denoising and not anti-aliasing.
+
+With jitter, all rays of a frame are moved by one offset (x, y) within the pixel. Its matrices then
+say where a point lies on the screen *less that offset*: what a pixel shows projects to its centre,
+and who reprojects by the matrices of two frames finds the right place without knowing of jitter.
+
+Source of the offsets: Halton 1960, bases 2 and 3, as in Karis 2014, "High-quality temporal
+supersampling" (SIGGRAPH course on advances in real-time rendering).
 """
 
 from __future__ import annotations
@@ -15,6 +22,25 @@ from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Camera
 
+Offset = tuple[float, float]
+NO_JITTER: Offset = (0.0, 0.0)
+PERIOD = 16  # frames after which offsets repeat: what went before weighs little then
+
+
+def halton(frame: int) -> Offset:
+    """The offset of a frame from pixels' centres, pixels, in [-1/2, 1/2) each."""
+    index = frame % PERIOD + 1
+    return _radical_inverse(index, 2) - 0.5, _radical_inverse(index, 3) - 0.5
+
+
+def _radical_inverse(index: int, base: int) -> float:
+    """The digits of a number mirrored at the point."""
+    value, digit = 0.0, 1.0 / base
+    while index:
+        index, rest = divmod(index, base)
+        value, digit = value + rest * digit, digit / base
+    return value
+
 
 @dataclass(frozen=True)
 class CameraMatrices:
@@ -24,10 +50,17 @@ class CameraMatrices:
     screen_from_world: np.ndarray
 
 
-def camera_matrices(camera: Camera, frame: float, height: int, width: int) -> CameraMatrices:
+def camera_matrices(camera: Camera, frame: float, height: int, width: int,
+                    jitter: Offset = NO_JITTER) -> CameraMatrices:
     camera_from_world = np.linalg.inv(camera.world_from_camera_at(frame))
-    screen_from_camera = camera.screen_from_camera(height, width)
-    return CameraMatrices(camera_from_world, screen_from_camera @ camera_from_world)
+    return CameraMatrices(camera_from_world,
+                          _screen_from_camera(camera, height, width, jitter) @ camera_from_world)
+
+
+def _screen_from_camera(camera: Camera, height: int, width: int, jitter: Offset) -> np.ndarray:
+    moved = np.eye(4)
+    moved[:2, 3] = -jitter[0], -jitter[1]
+    return moved @ camera.screen_from_camera(height, width)
 
 
 @dataclass
@@ -50,11 +83,13 @@ class PixelRays:
         return mi.Ray3f(self.origin, direction * scale), scale * self.unit
 
 
-def pixel_rays(stage: MitsubaScene, height: int, width: int) -> PixelRays:
+def pixel_rays(stage: MitsubaScene, height: int, width: int,
+               jitter: Offset = NO_JITTER) -> PixelRays:
     """The camera's rays at the stage's frame, in the stage's space."""
     camera = stage.description.camera
     world_from_camera = camera.world_from_camera_at(stage.frame)
-    projection = camera.screen_from_camera(height, width)[np.ix_([0, 1, 3], [0, 1, 2])]
+    screen_from_camera = _screen_from_camera(camera, height, width, jitter)
+    projection = screen_from_camera[np.ix_([0, 1, 3], [0, 1, 2])]
     direction_from_screen = world_from_camera[:3, :3] @ np.linalg.inv(projection)
     origin = (world_from_camera[:3, 3] - stage.origin) / stage.unit
     columns = [_opaque(column) for column in direction_from_screen.T]

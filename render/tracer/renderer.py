@@ -67,7 +67,8 @@ class Renderer(View):
         self.stage.set_frame(index)
         planes = self._trace_frame(index, seed, [c for c in channels if c not in REPLAY])
         dr.eval(planes)
-        matrices = camera_matrices(self.scene.camera, index, self.height, self.width)
+        matrices = camera_matrices(self.scene.camera, index, self.height, self.width,
+                                   self.jitter_at(index))
         images = {name: self._image(value) for name, value in planes.items()}
         images |= {name: image for name, image in replayed.items() if name in channels}
         return Frame(index, images, matrices.camera_from_world, matrices.screen_from_world,
@@ -139,7 +140,7 @@ class Renderer(View):
                        antialias: bool):
         scene = self.stage.mi_scene
         pixel = dr.arange(mi.UInt32, self.height * self.width)
-        rays = self.rays()
+        rays = self.rays(jittered=False)
         keys = keys_from_seed(seed, REFERENCE_STREAM, index, part)
         x, y = self.centres(pixel)
         centre_ray, _ = rays.at(x, y)

@@ -76,7 +76,8 @@ def _shade_both(view: View, index: int, previous: int,
     point = _moved(point, id_, stage.stage_from_stage(old_places))
     new = _shade(view, previous, seed, pixel, point, id_)
 
-    camera = camera_matrices(view.scene.camera, index, view.height, view.width)
+    camera = camera_matrices(view.scene.camera, index, view.height, view.width,
+                             view.jitter_at(index))
     at = np.nan_to_num(point.numpy().astype(np.float64).T)
     world = stage.origin + stage.unit * at
     screen = world @ camera.screen_from_world[:, :3].T + camera.screen_from_world[:, 3]

@@ -11,7 +11,7 @@ from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Scene
 
-from .camera_rays import PixelRays, pixel_rays
+from .camera_rays import NO_JITTER, Offset, PixelRays, halton, pixel_rays
 from .candidates import candidates_for
 from .light_groups import find_groups
 from .lights import LightGroups
@@ -24,6 +24,7 @@ SAMPLERS: dict[str, Callable[[Keys, Any, int], Sampler]] = {
                                                z_order(pixel % width, pixel // width)),
     "bluenoise": lambda keys, pixel, width: BlueNoise(keys, pixel % width, pixel // width),
 }
+JITTERS = ("none", "halton")
 
 
 class View:
@@ -32,19 +33,20 @@ class View:
     Attributes:
         scene, stage: the description, and what Mitsuba made of it. height, width: pixels.
         direct: one of `DIRECT`. sampler: one of `SAMPLERS`. candidates: points of the lights that
-            a vertex of a frame's path compares, 1 for `--direct mis`.
+            a vertex of a frame's path compares, 1 for `--direct mis`. jitter: one of `JITTERS`.
 
     Raises:
-        InputError: a size below 1x1, or an unknown `direct` or `sampler`.
+        InputError: a size below 1x1, or an unknown `direct`, `sampler` or `jitter`.
         SceneError: a scene that Mitsuba cannot build.
     """
 
     def __init__(self, scene: Scene, height: int, width: int, direct: str = "mis",
-                 sampler: str = "pcg") -> None:
-        for option, value, known in (("direct", direct, DIRECT), ("sampler", sampler, SAMPLERS)):
+                 sampler: str = "pcg", jitter: str = "none") -> None:
+        for option, value, known in (("direct", direct, DIRECT), ("sampler", sampler, SAMPLERS),
+                                     ("jitter", jitter, JITTERS)):
             if value not in known:
                 raise InputError(f"unknown --{option} '{value}': use {' or '.join(known)}")
-        self.direct, self.sampler = direct, sampler
+        self.direct, self.sampler, self.jitter = direct, sampler, jitter
         if height < 1 or width < 1:
             raise InputError(f"the size {width}x{height} is empty: use at least 1x1")
         self.scene, self.height, self.width = scene, height, width
@@ -62,9 +64,18 @@ class View:
         find them moves the stage."""
         return find_groups(self.stage) if self.splits else None
 
-    def rays(self) -> PixelRays:
-        """Rays through points of the image, at the frame that the stage is set to."""
-        return pixel_rays(self.stage, self.height, self.width)
+    def rays(self, jittered: bool = True) -> PixelRays:
+        """Rays through points of the image, at the frame that the stage is set to.
+
+        Args:
+            jittered: those of a frame; a reference's are not.
+        """
+        jitter = self.jitter_at(int(self.stage.frame)) if jittered else NO_JITTER
+        return pixel_rays(self.stage, self.height, self.width, jitter)
+
+    def jitter_at(self, frame: int) -> Offset:
+        """How far a frame's rays are from pixels' centres, pixels."""
+        return halton(frame) if self.jitter == "halton" else NO_JITTER
 
     def new_sampler(self, keys: Keys, pixel: mi.UInt32) -> Sampler:
         """The random numbers of pixels."""

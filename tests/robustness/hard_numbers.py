@@ -163,6 +163,14 @@ def _last(spatial: Callable[..., np.ndarray]) -> Callable:
     return lambda frames, **sigmas: spatial(frames[-1], **sigmas)
 
 
+def _gaussian(frame: Frame, **sigmas: float) -> np.ndarray:
+    return oracles.gaussian(frame, RADIUS, **sigmas)
+
+
+def _bilateral_color(frame: Frame, **sigmas: float) -> np.ndarray:
+    return oracles.bilateral_color(frame, RADIUS, **sigmas)
+
+
 def _bilateral(frame: Frame, **sigmas: float) -> np.ndarray:
     return oracles.bilateral(frame, RADIUS, **sigmas)
 
@@ -176,6 +184,9 @@ def _atrous(frame: Frame, **sigmas: float) -> np.ndarray:
 
 
 EXACT: dict[str, Callable] = {
+    "gaussian": _last(_gaussian),
+    "gaussian-separable": _last(_gaussian),
+    "bilateral-color": _last(_bilateral_color),
     "bilateral": _last(_bilateral),
     "bilateral-separable": _last(_separable),
     "atrous": _last(_atrous),

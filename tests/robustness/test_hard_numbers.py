@@ -54,7 +54,7 @@ def test_a_kernel_agrees_with_float64_at_any_size(name, size):
     assert errors_of(name, "plain", size).max() < BOUND
 
 
-@each_kernel
+@pytest.mark.parametrize("name", [n for n in EXACT if not n.startswith("gaussian")])
 def test_a_kernel_whose_weights_all_underflow_leaves_pixels_as_they_are(name):
     assert errors_of(name, "all far apart", **UNDERFLOW).max() < BOUND
     frame = frames_of("all far apart")[-1]

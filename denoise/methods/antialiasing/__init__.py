@@ -1,0 +1,1 @@
+"""Temporal anti-aliasing, on its own and after our filter."""
