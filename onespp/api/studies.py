@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from onespp.denoise.catalog import Method
+from onespp.denoise.own_method import result_name
+from onespp.denoise.score.scorecard import Scores
 from onespp.denoise.studies.hard_scenes import Row, judge
+from onespp.denoise.studies.suite import Group, groups
+from onespp.render.errors import InputError
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.games202.convert import export_games202, import_games202
 from onespp.render.progress import Progress
+from onespp.scenes.catalog import GENERATED
+from onespp.scenes.generated import KEPT
 from onespp.scenes.hard import HARD
+
+from .caller import caller
+from .denoising import denoise
+from .rendering import render
+from .scoring import score
+
+SIZES = {"box": (256, 256), "room": (180, 320), "generated/": (108, 160)}
+"""(height, width) of the suite's scenes, by how their names begin."""
 
 
 def judge_hard(name: str, methods: Mapping[str, Method], folder: Path, reference_spp: int,
@@ -38,6 +53,41 @@ def judge_hard(name: str, methods: Mapping[str, Method], folder: Path, reference
     for note in reference_notes(sequence, sequence.frames, reference_spp):
         tell(note)
     return judge(sequence, name, hard.event, hard.diffuse, progress, methods)
+
+
+def score_suite(method: str, pattern: re.Pattern[str], folder: Path,
+                size: tuple[int, int] | None, frames: Sequence[int], reference_spp: int,
+                seed: int) -> dict[Group, dict[str, Scores]]:
+    """Render, denoise and score the suite's scenes; renders and peers' results are kept.
+
+    Args:
+        method: a name, or a file of one's own. pattern: of the names of scenes.
+        folder: of all sequences, those of plain frames in its `plain/`.
+        size: (height, width) in pixels, default `SIZES`, and the hard scenes' own.
+
+    Returns:
+        group -> scene -> scores of the method and the group's peers.
+
+    Raises:
+        InputError: no scene has such a name, or a folder holds something else.
+    """
+    found: dict[Group, dict[str, Scores]] = {}
+    asked = groups([GENERATED[i] for i in KEPT], [f"hard/{name}" for name in HARD])
+    if not any(pattern.search(scene) for group in asked for scene in group.scenes):
+        raise InputError(f"no scene of the suite has '{pattern.pattern}' in its name: `onespp "
+                         "scenes` lists them")
+    for group in asked:
+        scored = found[group] = {}
+        for scene in filter(pattern.search, group.scenes):
+            pixels = size or next((s for key, s in SIZES.items() if scene.startswith(key)), None)
+            sequence = render(scene, folder / scene, frames=frames, size=pixels, seed=seed,
+                              reference_spp=reference_spp)
+            if group.plain:
+                sequence = plain_copy(sequence, folder / "plain" / scene, caller().command())
+            for name in without_results(sequence, method, group.peers):
+                denoise(sequence, name)
+            scored[scene] = score(sequence, dict.fromkeys((result_name(method), *group.peers)))
+    return found
 
 
 def without_results(sequence: FrameSequence, method: str, peers: tuple[str, ...]) -> list[str]:

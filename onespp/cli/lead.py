@@ -3,27 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from onespp.denoise.cli.denoise import denoise_in
 from onespp.denoise.own_method import result_name
+from onespp.render.cli.arguments import parse_size
 from onespp.render.cli.figures import json_option, show_or_print
 from onespp.render.cli.options import device_option, threads_option, use
-from onespp.render.cli.render import render_to
-from onespp.render.cli.terminal import command_line
 from onespp.render.errors import InputError
 from onespp.render.files.frame_ranges import parse_frames
-from onespp.render.files.lock import writing
-from onespp.render.files.sequence import FrameSequence
-
-if TYPE_CHECKING:
-    from onespp.denoise.score.scorecard import Scores
-
-SIZES = {"box": "256x256", "room": "320x180", "generated/": "160x108"}
 
 
 @click.command()
@@ -61,7 +50,6 @@ def lead(folders: tuple[Path, ...], method: str, peer: str, suite: bool, scenes:
     if folders:
         raise InputError("--suite takes no folders: it renders its own into --out")
     use(device, threads)
-    parse_frames(frames)
     _suite(method, _pattern(scenes), out, size, frames, reference_spp, seed, json_to)
 
 
@@ -97,41 +85,13 @@ def _pairs(folders: tuple[Path, ...], method: str, peer: str, json_to: str | Non
 
 def _suite(method: str, pattern: re.Pattern[str], out: Path, size: str | None, frames: str,
            reference_spp: int, seed: int, json_to: str | None) -> None:
-    from onespp.api.studies import plain_copy
-    from onespp.denoise.studies.suite import Group, figures, groups, markdown
-    from onespp.scenes.catalog import GENERATED
-    from onespp.scenes.generated import KEPT
-    from onespp.scenes.hard import HARD
+    from onespp.api.studies import score_suite
+    from onespp.denoise.studies.suite import figures, markdown
 
-    found: dict[Group, Mapping[str, Scores]] = {}
-    asked = groups([GENERATED[i] for i in KEPT], [f"hard/{name}" for name in HARD])
-    if not any(pattern.search(scene) for group in asked for scene in group.scenes):
-        raise InputError(f"no scene of the suite has '{pattern.pattern}' in its name: `onespp "
-                         "scenes` lists them")
-    for group in asked:
-        scored: dict[str, Scores] = {}
-        for scene in filter(pattern.search, group.scenes):
-            pixels = size or next((s for key, s in SIZES.items() if scene.startswith(key)), None)
-            rendered = render_to(
-                scene, out / scene, frames=frames, size=pixels, seed=seed,
-                reference_spp=reference_spp)
-            if group.plain:
-                rendered = plain_copy(rendered, out / "plain" / scene, command_line())
-            scored[scene] = _scored(rendered, method, group.peers)
-        found[group] = scored
+    found = score_suite(method, pattern, out, None if size is None else parse_size(size),
+                        parse_frames(frames), reference_spp, seed)
     show_or_print(figures(result_name(method), found), json_to,
                   lambda: click.echo(markdown(result_name(method), found)))
-
-
-def _scored(sequence: FrameSequence, method: str, peers: tuple[str, ...]) -> Scores:
-    """Scores of the method and its peers, after denoising by those without results."""
-    from onespp.api.studies import without_results
-    from onespp.denoise.score.sequence import score
-
-    denoise_in(sequence.folder, tuple(without_results(sequence, method, peers)))
-    with writing(sequence.folder, "score"):
-        return score(sequence, list(dict.fromkeys((result_name(method), *peers))),
-                     command=command_line())
 
 
 def _pattern(text: str) -> re.Pattern[str]:
