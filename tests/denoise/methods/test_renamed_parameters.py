@@ -40,7 +40,7 @@ def test_former_names_are_of_parameters_that_exist_and_of_none_that_does(name):
     assert set(renamed.values()) <= set(known)
     assert not set(renamed) & set(known)
     assert len(set(renamed.values())) == len(renamed)
-    assert bool(renamed) == (name in ("svgf", "asvgf", "onespp"))
+    assert bool(renamed) == (name in ("svgf", "asvgf", "onespp", "onespp-taa"))
 
 
 def test_a_former_name_sets_the_parameter_and_is_noted():
