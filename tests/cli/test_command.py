@@ -183,7 +183,7 @@ def test_another_sequence_is_not_overwritten_unasked(call, scene_file, tmp_path)
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_a_stopped_render_ends_in_a_sentence_and_goes_on_to_the_same_bytes(
         how, call, scene_file, tmp_path):
-    arguments = ["render", str(scene_file), "--frames", "0:60", "--size", "48x48",
+    arguments = ["render", str(scene_file), "--frames", "0:20", "--size", "48x48",
                  "--reference-spp", "64"]
     process = subprocess.Popen([sys.executable, "-m", "onespp", *arguments, "--out",
                                 str(tmp_path / "stopped")], stderr=subprocess.PIPE, text=True)
