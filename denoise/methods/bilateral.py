@@ -23,15 +23,16 @@ into one exponent of 2. acos^2(1 - t) is t times a quadratic, exact to 2e-4 for 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import drjit as dr
 
 from onespp.denoise.inputs.demodulation import read_texture
 from onespp.denoise.inputs.surface import Surface
 from onespp.denoise.jit.arrays import Color, Float, Vector3
-from onespp.denoise.jit.fastmath import exp2
+from onespp.denoise.jit.fastmath import LOG2E, exp2
 from onespp.denoise.jit.grid import Planes, Stencil
 from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import evaluate
@@ -41,7 +42,6 @@ from onespp.render.frame import Frame
 from .base import OnLanes
 from .parameters import check_positive, check_whole
 
-LOG2E = 1.4426950408889634
 # acos^2(1 - t) / t on [0, 1], relative error below 0.0026 (t + 0.02); beyond, it only grows.
 ACOS2 = (2.00009996, 0.32205101, 0.13894848)
 _FAR = 1e19       # colour outside the image: far from any other, so that its weight is 0
@@ -89,6 +89,13 @@ class WeightedColor(NamedTuple):
 
     color: Color
     weight: Float
+
+    def with_tap(self, w: Float, color: Color) -> WeightedColor:
+        return WeightedColor(Color(*[dr.fma(w, c, s) for c, s in zip(color, self.color)]),
+                             self.weight + w)
+
+    def mean(self) -> Color:
+        return Color(*[s / self.weight for s in self.color])
 
 
 @dataclass(frozen=True)
@@ -168,8 +175,12 @@ class Bilateral(OnLanes["BilateralState"]):
 
     @property
     def color_scale(self) -> float:
-        """Of colours in the planes, so that the square of a difference is its exponent of 2."""
-        return math.sqrt(LOG2E / 2) / self.sigma_color
+        return color_scale(self.sigma_color)
+
+
+def color_scale(sigma_color: float) -> float:
+    """Of colours in the planes, so that the square of a difference is its exponent of 2."""
+    return math.sqrt(LOG2E / 2) / sigma_color
 
 
 @dataclass(frozen=True)
@@ -177,24 +188,25 @@ class TapLine:
     """A row or a column of taps, the square of its distance from the pixel, and the recorded
     step."""
 
-    taps: Taps[BilateralSample]
+    taps: Taps[Any]
     squared_distance: Float
     step: Step[..., WeightedColor]
 
     @staticmethod
     def make(planes: Planes, offsets: list[Offset], distance: int,
-             step: Step[..., WeightedColor]) -> TapLine:
-        return TapLine(planes.taps(offsets).named(_sample), planes.stencil.opaque(distance**2),
-                       step)
+             step: Step[..., WeightedColor], named: Callable[..., Any] | None = None) -> TapLine:
+        """Taps of a `BilateralSample`, or of what `named` makes of the planes."""
+        return TapLine(planes.taps(offsets).named(named or _sample),
+                       planes.stencil.opaque(distance**2), step)
 
-    def add(self, center: Center, sums: WeightedColor, weights: BilateralWeights) -> WeightedColor:
+    def add(self, center: Any, sums: WeightedColor, weights: Any) -> WeightedColor:
         """The sums with these taps added."""
         return self.step(self.taps, self.squared_distance, center, sums, weights)
 
 
 @dataclass(frozen=True)
 class BilateralState:
-    """Planes of a `BilateralSample`, and the lines of taps in the order of their passes."""
+    """Planes of what a pixel is weighed by, and the lines of taps in the order of their passes."""
 
     stencil: Stencil
     planes: Planes
@@ -217,7 +229,6 @@ def add_taps(taps: Taps[BilateralSample], squared_distance: Float, center: Cente
     (own_color, own_normal, own_kind, own_position), self_product = center
     coord, angle, plane = weights
     (cr, cg, cb), (nx, ny, nz), (px, py, pz) = own_color, own_normal, own_position
-    (r, g, b), w_sum = sums
     radius = len(taps) // 2
     line = coord * squared_distance
     for i in range(len(taps)):
@@ -233,11 +244,9 @@ def add_taps(taps: Taps[BilateralSample], squared_distance: Float, center: Cente
         distance2 = dr.fma(dx, dx, dr.fma(dy, dy, dr.fma(dz, dz, _TINY)))
         across = dr.fma(nx, dx, dr.fma(ny, dy, nz * dz))
         e = dr.fma(across * across / distance2, plane, e)
-        w = exp2(e)
-        r, g, b = dr.fma(w, color.red, r), dr.fma(w, color.green, g), dr.fma(w, color.blue, b)
-        w_sum = w_sum + w
+        sums = sums.with_tap(exp2(e), color)
         taps.next()
-    return WeightedColor(Color(r, g, b), w_sum)
+    return sums
 
 
 def _sample(red: Float, green: Float, blue: Float, nx: Float, ny: Float, nz: Float, kind: Float,

@@ -78,5 +78,4 @@ class BilateralSeparable(Bilateral):
 
 def _with_mean(center: Center, sums: WeightedColor) -> Center:
     """The pixel with the mean of the taps in the place of its colour."""
-    mean = Color(*[s / sums.weight for s in sums.color])
-    return center._replace(sample=center.sample._replace(color=mean))
+    return center._replace(sample=center.sample._replace(color=sums.mean()))

@@ -59,8 +59,8 @@ def lengths_left(layout: SignalLayout, innovations: Innovations, smoothed: Smoot
     """
     spreads = iter(smoothed.visibility_spread)
     left = []
-    for s, (kind, p) in enumerate(zip(layout.kinds, weights, strict=True)):
-        wide, group = [smoothed.diffuse, *smoothed.sharp][s], layout.group(s)
+    for s, (kind, wide, p) in enumerate(zip(layout.kinds, smoothed.each, weights, strict=True)):
+        group = layout.group(s)
         if kind is SignalKind.VISIBILITY:
             spread = next(spreads)
         elif kind is SignalKind.GLOSSY:

@@ -66,6 +66,11 @@ class Smoothed(NamedTuple):
     weights: list[Float]
     energies: list[Float]
 
+    @property
+    def each(self) -> list[Signal]:
+        """S[e] of each signal, in their order."""
+        return [self.diffuse, *self.sharp]
+
 
 @dataclass(frozen=True)
 class PlaneRule:

@@ -67,9 +67,8 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
     omegas = weights_of(layout, chosen)
     dense = [s for s, omega in enumerate(omegas) if omega is None]
     first = [_only_sample(y, omega) for y, omega in zip(signals, omegas) if omega is not None]
-    sharp = [smoothed.diffuse, *smoothed.sharp]
-    changes = [_change(sharp[len(dense) + g].luminance, weight, sparse.history)
-               for g, (weight, sparse) in enumerate(zip(smoothed.weights, innovations.sparse))]
+    changes = [_change(wide.luminance, weight, sparse.history) for wide, weight, sparse in zip(
+        smoothed.each[len(dense):], smoothed.weights, innovations.sparse, strict=True)]
     left = lengths_left(layout, innovations, smoothed, changes, gains.noise_threshold,
                         gains.changes)
     lengths = list(innovations.lengths)
@@ -87,8 +86,9 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
     spatial = spatial_variances(stencil, [signals[s] for s in dense], asks, plane, first)
     visible = dict(zip(layout.visibilities, smoothed.visibility_spread, strict=True))
     merged, sparse_fades = [], []
-    for s, (kind, signal) in enumerate(zip(layout.kinds, signals, strict=True)):
-        e, wide = innovations.signals[s], sharp[s]
+    for s, (kind, signal, wide) in enumerate(
+            zip(layout.kinds, signals, smoothed.each, strict=True)):
+        e = innovations.signals[s]
         variance, omega, samples = innovations.variances[s], omegas[s], None
         alpha, gain = gains.alphas[s], gains.sharp_min_gain
         if kind is SignalKind.DIFFUSE:

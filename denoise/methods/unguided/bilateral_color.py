@@ -18,7 +18,6 @@ Form: as `gaussian.py`; both terms are summed into one exponent of 2.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import drjit as dr
@@ -26,20 +25,19 @@ import drjit as dr
 from onespp.denoise.inputs.surface import Surface
 from onespp.denoise.jit.arrays import Color, Float
 from onespp.denoise.jit.fastmath import LOG2E, exp2
-from onespp.denoise.jit.grid import Planes, Stencil
+from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import evaluate
 from onespp.denoise.jit.taps import Taps
 from onespp.render.frame import Frame
 
 from ..base import OnLanes
-from ..bilateral import OUTSIDE, WeightedColor, no_taps
+from ..bilateral import OUTSIDE, BilateralState, TapLine, WeightedColor, color_scale, no_taps
 from ..parameters import check_positive, check_whole
-from .gaussian import mean
 
 
 @dataclass(frozen=True)
-class BilateralColor(OnLanes["BilateralColorState"]):
+class BilateralColor(OnLanes[BilateralState]):
     """Bilateral filter of each frame on its own, by distance and colour alone.
 
     Attributes:
@@ -66,35 +64,24 @@ class BilateralColor(OnLanes["BilateralColorState"]):
     def reach(self) -> int:
         return self.radius
 
-    def init_on(self, stencil: Stencil) -> BilateralColorState:
+    def init_on(self, stencil: Stencil) -> BilateralState:
         planes, step = stencil.planes(OUTSIDE[:3]), Step(add_row)
         window = range(-self.radius, self.radius + 1)
-        return BilateralColorState(stencil, planes, step, {
-            dy: planes.taps([(dy, dx) for dx in window]).named(Color) for dy in window})
+        return BilateralState(stencil, planes, [
+            TapLine.make(planes, [(dy, dx) for dx in window], dy, step, Color) for dy in window])
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,
-                 state: BilateralColorState) -> tuple[Color, BilateralColorState]:
-        stencil, scale = state.stencil, math.sqrt(LOG2E / 2) / self.sigma_color
+                 state: BilateralState) -> tuple[Color, BilateralState]:
+        stencil, scale = state.stencil, color_scale(self.sigma_color)
         k = stencil.opaque(scale)
         center = Color(*[c * k for c in color])
         evaluate(center)
         state.planes.store(center)
         coord, sums = stencil.opaque(-LOG2E / 2 / self.sigma_coord**2), no_taps(stencil)
-        for dy, taps in state.rows.items():
-            sums = state.step(taps, stencil.opaque(dy**2), center, sums, coord)
+        for row in state.lines:
+            sums = row.add(center, sums, coord)
         k = stencil.opaque(1 / scale)
-        return Color(*[c * k for c in mean(sums)]), state
-
-
-@dataclass(frozen=True)
-class BilateralColorState:
-    """Planes of a colour scaled so that the square of a difference is its exponent of 2, the
-    recorded step, and rows of taps by their distance from the pixel."""
-
-    stencil: Stencil
-    planes: Planes
-    step: Step[..., WeightedColor]
-    rows: dict[int, Taps[Color]]
+        return Color(*[c * k for c in sums.mean()]), state
 
 
 def add_row(taps: Taps[Color], squared_distance: Float, center: Color, sums: WeightedColor,
@@ -106,7 +93,6 @@ def add_row(taps: Taps[Color], squared_distance: Float, center: Color, sums: Wei
         squared_distance: of that one from the pixel.
         coord: log2 of the weight of a pixel^2.
     """
-    (r, g, b), w_sum = sums
     radius = len(taps) // 2
     row = coord * squared_distance
     for i in range(len(taps)):
@@ -114,8 +100,6 @@ def add_row(taps: Taps[Color], squared_distance: Float, center: Color, sums: Wei
         e = dr.fma(coord, float((i - radius)**2), row)
         for tap, own in zip(color, center):
             e = dr.fma(tap - own, own - tap, e)
-        w = exp2(e)
-        r, g, b = dr.fma(w, color.red, r), dr.fma(w, color.green, g), dr.fma(w, color.blue, b)
-        w_sum = w_sum + w
+        sums = sums.with_tap(exp2(e), color)
         taps.next()
-    return WeightedColor(Color(r, g, b), w_sum)
+    return sums

@@ -83,7 +83,7 @@ class Gaussian(OnLanes["GaussianState"]):
         weights, sums = self.weights(stencil), no_taps(stencil)
         for line in state.lines:
             sums = line.step(line.taps, self.weight(stencil, line.distance), sums, weights)
-        return mean(sums), state
+        return sums.mean(), state
 
     def weights(self, stencil: Stencil) -> list[Float]:
         """Of taps 0 to `radius` pixels away along a line."""
@@ -123,10 +123,6 @@ def store(planes: Planes, color: Color) -> None:
     sample = CountedColor(color, planes.stencil.constant(1))
     evaluate(sample)
     planes.store(sample)
-
-
-def mean(sums: WeightedColor) -> Color:
-    return Color(*[s / sums.weight for s in sums.color])
 
 
 def add_line(taps: Taps[CountedColor], line_weight: Float, sums: WeightedColor,

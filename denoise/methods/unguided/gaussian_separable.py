@@ -24,7 +24,7 @@ from onespp.denoise.jit.step import Step
 from onespp.render.frame import Frame
 
 from ..bilateral import no_taps
-from .gaussian import Gaussian, GaussianLine, GaussianState, add_line, mean, store
+from .gaussian import Gaussian, GaussianLine, GaussianState, add_line, store
 
 
 @dataclass(frozen=True)
@@ -52,5 +52,5 @@ class GaussianSeparable(Gaussian):
         stencil, weights = state.stencil, self.weights(state.stencil)
         for line in state.lines:
             store(state.planes, color)
-            color = mean(line.step(line.taps, self.weight(stencil, 0), no_taps(stencil), weights))
+            color = line.step(line.taps, self.weight(stencil, 0), no_taps(stencil), weights).mean()
         return color, state

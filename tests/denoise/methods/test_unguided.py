@@ -100,7 +100,7 @@ def test_five_frames_one_recording_a_pass(kind):
     state = method.init(9, 11)
     for i in range(5):
         _, state = method(noisy(make_frame(9, 11), seed=i), state)
-    steps = [state.step] if kind is BilateralColor else [line.step for line in state.lines]
+    steps = [line.step for line in state.lines]
     assert {step.recordings for step in steps} == {1}
 
 
