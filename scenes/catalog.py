@@ -25,7 +25,13 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "room": room,
 }
 _HARD = "hard/"
+HARD_NAMES = tuple(_HARD + name for name in HARD)
 GENERATED = tuple(f"generated/{number}" for number in range(COUNT))
+
+
+def names() -> tuple[str, ...]:
+    """Of all scenes that come with onespp."""
+    return (*SCENES, *HARD_NAMES, *GENERATED)
 
 
 def load(name: str) -> Scene:
@@ -56,7 +62,7 @@ def offers() -> list[entry_points.Offer]:
 
 
 def _unknown(name: str) -> str:
-    known = (*SCENES, *(_HARD + hard for hard in HARD), *GENERATED, *(o.name for o in offers()))
+    known = (*names(), *(o.name for o in offers()))
     close = difflib.get_close_matches(name, known, n=1)
     hint = f"did you mean '{close[0]}'? " if close else ""
     return (f"unknown scene '{name}': {hint}there are {', '.join(sorted(SCENES))}, "

@@ -14,12 +14,12 @@ from onespp.render.channels import asked_channels
 from onespp.render.errors import InputError
 from onespp.render.files.frame_ranges import parse_frames
 from onespp.render.files.lock import writing
+from onespp.render.files.manifest import DIRECT, JITTERS, SAMPLERS
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.host.memory import require_memory
 from onespp.render.host.turns import turn
 from onespp.scenes import catalog
 from onespp.scenes.description import Scene, SceneError
-from onespp.scenes.hard import HARD
 
 from .caller import caller, public
 
@@ -78,9 +78,9 @@ def render(scene: str | Path | Scene, out: Path | str | None = None, *,
     numbers = _numbers(frames, made)
     if seed < 0:
         raise InputError(f"--seed is {seed}: use 0 or more")
-    _check_choice("direct", direct, ("mis", "resampled"))
-    _check_choice("sampler", sampler, ("pcg", "zsobol", "bluenoise"))
-    _check_choice("jitter", jitter, ("none", "halton"))
+    _check_choice("direct", direct, DIRECT)
+    _check_choice("sampler", sampler, SAMPLERS)
+    _check_choice("jitter", jitter, JITTERS)
     require_memory(height, width)
     text = channels if channels is None or isinstance(channels, str) else ",".join(channels)
     names, added = asked_channels(text)
@@ -126,9 +126,7 @@ def scenes() -> dict[str, str]:
         >>> "box" in onespp.scenes()
         True
     """
-    made = {name: catalog.load(name) for name in (*catalog.SCENES, *catalog.GENERATED)}
-    made.update({f"hard/{name}": hard.make() for name, hard in HARD.items()})
-    return {name: scene.about for name, scene in made.items()}
+    return {name: catalog.load(name).about for name in catalog.names()}
 
 
 def _loaded(scene: str | Path) -> Scene:

@@ -17,7 +17,7 @@ from onespp.render.files.lock import writing
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.games202.convert import export_games202, import_games202
 from onespp.render.progress import Progress
-from onespp.scenes.catalog import GENERATED
+from onespp.scenes.catalog import GENERATED, HARD_NAMES
 from onespp.scenes.generated import KEPT
 from onespp.scenes.hard import HARD
 
@@ -72,7 +72,7 @@ def score_suite(method: str, pattern: re.Pattern[str], folder: Path,
         InputError: no scene has such a name, or a folder holds something else.
     """
     found: dict[Group, dict[str, Scores]] = {}
-    asked = groups([GENERATED[i] for i in KEPT], [f"hard/{name}" for name in HARD])
+    asked = groups([GENERATED[i] for i in KEPT], list(HARD_NAMES))
     if not any(pattern.search(scene) for group in asked for scene in group.scenes):
         raise InputError(f"no scene of the suite has '{pattern.pattern}' in its name: `onespp "
                          "scenes` lists them")

@@ -18,10 +18,8 @@ def scenes(json_to: str | None) -> None:
     """List the scenes: frames, size, what moves."""
     from onespp.scenes import catalog
     from onespp.scenes.description import SceneError
-    from onespp.scenes.hard import HARD
 
-    made = {name: catalog.load(name) for name in (
-        *catalog.SCENES, *(f"hard/{name}" for name in HARD), *catalog.GENERATED)}
+    made = {name: catalog.load(name) for name in catalog.names()}
     packages, broken = {}, {}
     for offer in catalog.offers():
         try:
@@ -39,8 +37,8 @@ def scenes(json_to: str | None) -> None:
             click.echo(f"{name}: not usable, {error}")
         click.echo("\nSmall scenes that each isolate one failure; `onespp hard` tries methods on "
                    "them:")
-        for name in HARD:
-            scene = made[f"hard/{name}"]
+        for name in catalog.HARD_NAMES:
+            scene = made[name]
             click.echo(f"    {scene.name}: {scene.about}")
         click.echo("\nScenes drawn from a seed; the second half is kept to check with:")
         for name in catalog.GENERATED:

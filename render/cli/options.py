@@ -7,6 +7,7 @@ import os
 import click
 
 from onespp.render.channels import OFFERED, REPLAY
+from onespp.render.files.manifest import DIRECT, JITTERS, SAMPLERS
 from onespp.render.host import backend
 
 
@@ -54,14 +55,14 @@ def render_options(command):
                      help="Store radiance and guides, but not depth, in half precision: relative "
                           "error at most 0.05 %."),
         click.option("--direct", default="resampled", show_default=True,
-                     type=click.Choice(["mis", "resampled"]),
+                     type=click.Choice(DIRECT),
                      help="Direct light at the first hit: as Mitsuba's path, or by resampling all "
                           "lights, split into unshadowed light and visibility."),
         click.option("--sampler", default="zsobol", show_default=True,
-                     type=click.Choice(["pcg", "zsobol", "bluenoise"]),
+                     type=click.Choice(SAMPLERS),
                      help="Random numbers: independent, or with blue-noise error (two kinds)."),
         click.option("--jitter", default="none", show_default=True,
-                     type=click.Choice(["none", "halton"]),
+                     type=click.Choice(JITTERS),
                      help="Move all rays of a frame by an offset of its own within the pixel, for "
                           "temporal anti-aliasing; compare with a reference of --antialias."),
         overwrite_option, device_option, threads_option,

@@ -24,6 +24,8 @@ from .frame_ranges import format_frames, parse_frames
 from .json_file import JsonFile
 
 FORMAT = 1
+DIRECT, SAMPLERS, JITTERS = ("mis", "resampled"), ("pcg", "zsobol", "bluenoise"), ("none", "halton")
+"""What a render can be asked for, by the name that its manifest has."""
 
 
 def _frames(value: Any) -> tuple[int, ...]:

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from onespp.render.errors import InputError
+from onespp.render.files.manifest import DIRECT, JITTERS, SAMPLERS
 from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Scene
@@ -17,14 +18,12 @@ from .light_groups import find_groups
 from .lights import LightGroups
 from .sampler import BlueNoise, Keys, Pcg, Sampler, Sobol, z_order
 
-DIRECT = ("mis", "resampled")
-SAMPLERS: dict[str, Callable[[Keys, Any, int], Sampler]] = {
+_SAMPLERS: dict[str, Callable[[Keys, Any, int], Sampler]] = {
     "pcg": lambda keys, pixel, width: Pcg(keys, pixel),
     "zsobol": lambda keys, pixel, width: Sobol(keys, mi.UInt32(0),
                                                z_order(pixel % width, pixel // width)),
     "bluenoise": lambda keys, pixel, width: BlueNoise(keys, pixel % width, pixel // width),
 }
-JITTERS = ("none", "halton")
 
 
 class View:
@@ -79,7 +78,7 @@ class View:
 
     def new_sampler(self, keys: Keys, pixel: mi.UInt32) -> Sampler:
         """The random numbers of pixels."""
-        return SAMPLERS[self.sampler](keys, pixel, self.width)
+        return _SAMPLERS[self.sampler](keys, pixel, self.width)
 
     def centres(self, pixel: mi.UInt32) -> tuple[mi.Float, mi.Float]:
         """Screen coordinates (x, y) of pixels' centres, by index."""
