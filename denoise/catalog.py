@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -37,7 +37,7 @@ from onespp.denoise.methods.temporal import Temporal
 from onespp.denoise.methods.unguided.bilateral_color import BilateralColor
 from onespp.denoise.methods.unguided.gaussian import Gaussian
 from onespp.denoise.methods.unguided.gaussian_separable import GaussianSeparable
-from onespp.denoise.own_method import OwnMethod, from_file, installed, offers
+from onespp.denoise.own_method import OwnMethod, from_file, installed, offers, replaced
 from onespp.denoise.peers.oidn import Oidn
 from onespp.denoise.peers.oidn_split import OidnSplit
 from onespp.denoise.peers.optix import Optix
@@ -129,7 +129,7 @@ def configured(method: Method[Any], settings: Mapping[str, str],
             raise InputError(f"method '{name_of(method)}' has no parameter '{key}': it has "
                              f"{', '.join(known) or 'none, since it is no dataclass'}")
         typed[key] = _parse(key, text, type(known[key]))
-    return _replace(method, typed)
+    return replaced(method, typed)
 
 
 def _made(name: str) -> Method[Any]:
@@ -217,19 +217,6 @@ def versions_of(method: Any) -> dict[str, str]:
     """Package -> version, of the packages that decide what a method does."""
     inner = method.method if isinstance(method, WithoutOutliers) else method
     return {**versions("drjit"), **(inner.versions if isinstance(inner, OwnMethod) else {})}
-
-
-def _replace(method: Any, values: Mapping[str, Any]) -> Any:
-    if isinstance(method, OwnMethod):
-        return method.with_values({k: v for k, v in values.items() if k in method.defaults})
-    changes = {}
-    for f in fields(method):
-        value = getattr(method, f.name)
-        if is_dataclass(value):
-            changes[f.name] = _replace(value, values)
-        elif f.name in values:
-            changes[f.name] = values[f.name]
-    return replace(method, **changes)
 
 
 _WORDS = {"true": True, "yes": True, "on": True, "1": True,

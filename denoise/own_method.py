@@ -106,7 +106,7 @@ class OwnMethod:
         if not values:
             return self
         with self.code.running():
-            return replace(self, method=_replaced(self.method, values))
+            return replace(self, method=replaced(self.method, values))
 
     def _fault(self, what: str) -> Exception:
         thing = self.method if inspect.isfunction(self.method) else type(self.method).__call__
@@ -223,12 +223,15 @@ def _locked(array: np.ndarray) -> np.ndarray:
     return view
 
 
-def _replaced(method: Any, values: Mapping[str, Value]) -> Any:
+def replaced(method: Any, values: Mapping[str, Value]) -> Any:
+    """A dataclass with some fields changed, those of the dataclasses inside it included."""
+    if isinstance(method, OwnMethod):
+        return method.with_values({k: v for k, v in values.items() if k in method.defaults})
     changes = {}
     for f in fields(method):
         value = getattr(method, f.name, None)
         if is_dataclass(value) and f.init:
-            changes[f.name] = _replaced(value, values)
+            changes[f.name] = replaced(value, values)
         elif f.name in values and f.init:
             changes[f.name] = values[f.name]
     return replace(method, **changes) if changes else method
