@@ -1,5 +1,8 @@
 """Parameters by measurement: a coordinate search for the best mean PSNR over given sequences.
 
+The PSNR is the headline of the scores: by halves where references have them, so that their noise,
+which a filter can no more remove than it can fit, has no part in the choice.
+
 Each parameter in turn is tried a step up and down (numbers above 0 by a factor, whole numbers by 1,
 switches turned over); a better value is kept. When a round brings nothing, the factor gets smaller.
 It is a local search of a noisy function: what it finds is a default, not an optimum. Tune on other
@@ -15,8 +18,6 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any
 
-import numpy as np
-
 from onespp.denoise.catalog import (
     Method,
     channels_read,
@@ -27,8 +28,9 @@ from onespp.denoise.catalog import (
 )
 from onespp.denoise.methods.parameters import present_parameters
 from onespp.denoise.metrics.errors import psnr
+from onespp.denoise.metrics.estimate import number
+from onespp.denoise.metrics.image import Target, display_error, pair
 from onespp.denoise.metrics.means import mean_decibels
-from onespp.denoise.metrics.tonemap import srgb_from_linear
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import read_bytes, write_text
 from onespp.render.files.sequence import FrameSequence
@@ -43,11 +45,11 @@ Settings = dict[str, bool | int | float]
 
 @dataclass(frozen=True)
 class Case:
-    """A sequence in memory: frames, and display values of their references."""
+    """A sequence in memory: frames, and what they are judged against."""
 
     name: str
     frames: list[Frame]
-    references: list[np.ndarray]
+    targets: list[Target]
 
 
 def read_case(sequence: FrameSequence, method: Method) -> Case:
@@ -63,18 +65,22 @@ def read_case(sequence: FrameSequence, method: Method) -> Case:
     channels = channels_read(method, sequence.channels)
     return Case(sequence.folder.name,
                 [sequence.read_frame(i, list(channels)) for i in numbers],
-                [srgb_from_linear(sequence.read_reference(i).color) for i in numbers])
+                [Target(r.color, r.parts) for r in map(sequence.read_reference, numbers)])
 
 
 def mean_psnr(method: Method, cases: list[Case]) -> float:
     """dB on clipped sRGB: mean over the frames of a case, then over cases."""
     means = []
     for case in cases:
-        state, values = method.init(case.frames[0].height, case.frames[0].width), []
-        for frame, reference in zip(case.frames, case.references):
+        state, plain, squares = method.init(case.frames[0].height, case.frames[0].width), [], []
+        for frame, target in zip(case.frames, case.targets):
             image, state = method(frame, state)
-            values.append(psnr(srgb_from_linear(image), reference))
-        means.append(mean_decibels(values))
+            images = pair(image, target)
+            if (estimate := display_error(images)) is None:
+                plain.append(psnr(*images.srgb))
+            else:
+                squares.append(estimate.without_noise())
+        means.append(mean_decibels(plain) if plain else number("dB", squares).value)
     return fmean(means)
 
 

@@ -1,8 +1,8 @@
 """Direct light at the first hit by resampling a fixed stratification of all lights.
 
-Symbols: k a stratum (each emitter's sample square is cut into GRID x GRID), c_k the unshadowed
-contribution of k's midpoint, l(.) luminance, U = sum_k c_k, K strata in all. Stratum k is picked
-with
+Symbols: k a stratum (a cell of an emitter's sample square, which `scene_lights.py` cuts into 4 x 4,
+fewer where lights are many), c_k the unshadowed contribution of k's midpoint, l(.) luminance,
+U = sum_k c_k, K strata in all. Stratum k is picked with
 
     p_k = (1 - DELTA) l(c_k) / l(U) + DELTA / K,
 
@@ -20,7 +20,7 @@ lights that touch the surface. The uniform part DELTA reaches lights whose midpo
 the horizon.
 
 Where several lights meet, V is noise of which of them was picked. So lights are in groups g
-(`light_groups.py`) with a visibility each. There w_k c_k is in the place of c_k where strata are
+(`scene_lights.py`) with a visibility each. There w_k c_k is in the place of c_k where strata are
 picked, w_k being the weight of k's midpoint; U_g is its sum over the strata of g, P_g that of p_k.
 The ray, if it went to g, tells
 
@@ -45,18 +45,22 @@ from onespp.render.mitsuba.variant import mi
 
 from .sampler import Sampler
 
-GRID = 4
 DELTA = 0.1
 _DIMMEST = 1e-6  # share of l(U): a group that gives less has no visibility
 
 
 @dataclass
-class LightGroups:
-    """Which group each emitter is in, in the order of `scene.emitters()`; sizes: emitters in each.
+class Lights:
+    """All strata of a scene's lights, in the order of `scene.emitters()`.
+
+    stratum: emitter, cells a side and cell of each (`stratum_word`). group: that it is in.
+    sizes: strata in each group, none where all lights are one. emitters: how many there are.
     """
 
-    of_emitter: mi.UInt32
+    stratum: mi.UInt32
+    group: mi.UInt32
     sizes: tuple[int, ...]
+    emitters: int
 
 
 @dataclass
@@ -94,28 +98,28 @@ class DirectLight:
 
 @dr.syntax
 def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
-                    active: mi.Bool, groups: Any = None) -> DirectLight:
+                    active: mi.Bool, lights: Any) -> DirectLight:
     """Direct light toward `si.wi` from light sampling, one shadow ray a lane.
 
     Args:
-        groups: `LightGroups`, None where all lights are one.
+        lights: `Lights`, of the scene.
     """
-    emitters = len(scene.emitters())
-    strata = GRID * GRID * emitters
+    emitters, strata = lights.emitters, dr.width(lights.stratum)
     choice, jitter = sampler.next_1d(), sampler.next_2d()
 
     # One pass: the sum, and a pick in proportion to luminance (a reservoir of one).
     left = mi.Float(choice)
     unshadowed, total = mi.Color3f(0), mi.Float(0)
     picked, picked_luminance = mi.UInt32(0), mi.Float(0)
-    by_group = [mi.Color3f(0) for _ in groups.sizes] if groups else []
+    by_group = [mi.Color3f(0) for _ in lights.sizes]
     k = mi.UInt32(0)
     while dr.hint(k < strata, max_iterations=strata, label="lights"):
-        c, light = contribution(scene, si, k, mi.Point2f(0.5), active)
+        stratum = dr.gather(mi.UInt32, lights.stratum, k, active)
+        c, light = contribution(scene, si, stratum, mi.Point2f(0.5), active)
         unshadowed += c
-        if dr.hint(groups is not None, mode="scalar"):
+        if dr.hint(len(lights.sizes) > 0, mode="scalar"):
             c = weight(si, light, emitters, active) * c
-            group = dr.gather(mi.UInt32, groups.of_emitter, k // (GRID * GRID), active)
+            group = dr.gather(mi.UInt32, lights.group, k, active)
             by_group = added(by_group, group, c)
         luminance = mi.luminance(c)
         total += luminance
@@ -132,13 +136,14 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     uniform = dark | (left < DELTA)
     anywhere = dr.select(dark, choice, left / DELTA)
     picked = dr.select(uniform, dr.minimum(mi.UInt32(anywhere * strata), strata - 1), picked)
-    middle, light = contribution(scene, si, picked, mi.Point2f(0.5), active & uniform)
-    if dr.hint(groups is not None, mode="scalar"):
+    stratum = dr.gather(mi.UInt32, lights.stratum, picked, active)
+    middle, light = contribution(scene, si, stratum, mi.Point2f(0.5), active & uniform)
+    if dr.hint(len(lights.sizes) > 0, mode="scalar"):
         middle = weight(si, light, emitters, active & uniform) * middle
     picked_luminance = dr.select(uniform, mi.luminance(middle), picked_luminance)
     p = dr.select(dark, 1, (1 - DELTA) * strata * picked_luminance / total + DELTA) / strata
 
-    c, light = contribution(scene, si, picked, jitter, active)
+    c, light = contribution(scene, si, stratum, jitter, active)
     lit = active & (dr.max(c) > 0)
     toward = si.spawn_ray_to(light.p)
     blocker = scene.ray_intersect_preliminary(toward, coherent=False, active=lit)
@@ -146,9 +151,9 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     w = weight(si, light, emitters, lit)
     direct = dr.select(lit & ~shadowed, w * c / p, 0)
     sample = None
-    if dr.hint(groups is not None, mode="scalar"):
-        group = dr.gather(mi.UInt32, groups.of_emitter, picked // (GRID * GRID), active)
-        sample = group_sample(groups, by_group, group, total, mi.luminance(direct),
+    if dr.hint(len(lights.sizes) > 0, mode="scalar"):
+        group = dr.gather(mi.UInt32, lights.group, picked, active)
+        sample = group_sample(lights, by_group, group, total, mi.luminance(direct),
                               picked_luminance / p, active)
     return DirectLight(
         direct, unshadowed,
@@ -161,15 +166,15 @@ def added(lights: list[mi.Color3f], group: mi.UInt32, light: mi.Color3f) -> list
     return [dr.select(group == g, u + light, u) for g, u in enumerate(lights)]
 
 
-def group_sample(groups: LightGroups, unshadowed: list[mi.Color3f], group: mi.UInt32,
+def group_sample(lights: Lights, unshadowed: list[mi.Color3f], group: mi.UInt32,
                  total: mi.Float, arrived: mi.Float, possible: mi.Float,
                  active: mi.Bool) -> GroupSample:
     """What a ray to a group tells; arrived: v l(w c) / p_k. possible: l(w_k c_k) / p_k."""
     chance, of_group = mi.Float(0), mi.Float(0)
-    for g, size in enumerate(groups.sizes):
+    for g, size in enumerate(lights.sizes):
         luminance, is_it = mi.luminance(unshadowed[g]), group == g
         of_group = dr.select(is_it, luminance, of_group)
-        share = (1 - DELTA) * luminance / total + DELTA * (size / sum(groups.sizes))
+        share = (1 - DELTA) * luminance / total + DELTA * (size / sum(lights.sizes))
         chance = dr.select(is_it, share, chance)
     told = active & (of_group > _DIMMEST * total)
     scale = dr.select(told, chance / of_group, 0)
@@ -182,15 +187,21 @@ def shape_index(shape: mi.ShapePtr, active: mi.Bool) -> mi.UInt32:
     return dr.select(active, dr.reinterpret_array(mi.UInt32, shape), 0)
 
 
-def contribution(scene: mi.Scene, si: mi.SurfaceInteraction3f, k: mi.UInt32, place: mi.Point2f,
-                 active: mi.Bool) -> tuple[mi.Color3f, mi.DirectionSample3f]:
-    """c_k at a place in stratum k, and the point of the light that it comes from."""
-    emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), k // (GRID * GRID), active)
-    cell = k % (GRID * GRID)
-    sample = (mi.Point2f(cell % GRID, cell // GRID) + place) / GRID
+def stratum_word(emitter: Any, halvings: Any, cell: Any) -> Any:
+    """A stratum in a word: a cell, row by row, of an emitter whose sides are halved so often."""
+    return emitter * 256 + halvings * 16 + cell
+
+
+def contribution(scene: mi.Scene, si: mi.SurfaceInteraction3f, stratum: mi.UInt32,
+                 place: mi.Point2f, active: mi.Bool) -> tuple[mi.Color3f, mi.DirectionSample3f]:
+    """c_k at a place in a stratum, and the point of the light that it comes from."""
+    emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), stratum >> 8, active)
+    halvings, cell = (stratum >> 4) & 15, stratum & 15  # no division: idle lanes have all bits 0
+    row, side = cell >> halvings, mi.Float(1 << halvings)
+    sample = (mi.Point2f(cell - (row << halvings), row) + place) / side
     light, weight = emitter.sample_direction(si, sample, active)
     value = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(light.d), active)
-    c = dr.select(active & (light.pdf > 0), value * weight, 0) / (GRID * GRID)
+    c = dr.select(active & (light.pdf > 0), value * weight, 0) / dr.square(side)
     return c, light
 
 

@@ -21,7 +21,7 @@ import drjit as dr
 from onespp.render.mitsuba.variant import mi
 
 from .candidates import sought_light
-from .lights import DirectLight, LightGroups, power_heuristic, resample_lights, shape_index
+from .lights import DirectLight, Lights, power_heuristic, resample_lights, shape_index
 from .sampler import Sampler, Sobol
 
 LARGEST_VISIBILITY = 1e4  # picks of 16 lights give up to 2560, by what lights.py lets a pick weigh
@@ -51,17 +51,15 @@ class Radiance:
 
 @dr.syntax
 def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
-          max_depth: int, resampled: bool = False, candidates: int = 1,
-          groups: LightGroups | None = None) -> Radiance:
+          max_depth: int, candidates: int = 1, lights: Lights | None = None) -> Radiance:
     """One path a lane.
 
     Args:
         scene: what to trace. ray: camera rays. pi: their first hits.
         sampler: random numbers, advanced by the call.
         max_depth: longest path in segments, as in Mitsuba (1: emission, 2: direct light).
-        resampled: direct light at the first hit by resampling instead of by MIS.
         candidates: points of the lights that a vertex compares before it sends its shadow ray.
-        groups: of lights, which the shadow ray then tells apart.
+        lights: those that direct light at the first hit is resampled from; None: it is by MIS too.
     """
     context = mi.BSDFContext()
     ray = mi.Ray3f(ray)
@@ -78,10 +76,10 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     active = mi.Bool(True)
 
     split = None
-    if dr.hint(resampled and max_depth > 1, mode="scalar"):
+    if dr.hint(lights is not None, mode="scalar"):
         first = pi.compute_surface_interaction(ray)
         smooth = first.is_valid() & mi.has_flag(first.bsdf().flags(), mi.BSDFFlags.Smooth)
-        split = resample_lights(scene, first, sampler, smooth, groups)
+        split = resample_lights(scene, first, sampler, smooth, lights)
         direct += split.direct
         arrived += split.direct
 
@@ -95,7 +93,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         # Light that this vertex looks for: one shadow ray.
         inner = si.is_valid() & (depth + 1 < max_depth)
         smooth = inner & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        if dr.hint(resampled, mode="scalar"):
+        if dr.hint(lights is not None, mode="scalar"):
             smooth &= depth > 0
             arrived += dr.select((depth == 1) & ~from_delta, found, 0)
         sought = beta * sought_light(scene, si, sampler, candidates, smooth)

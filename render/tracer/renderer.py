@@ -44,7 +44,7 @@ class Renderer(View):
     @property
     def _grouped(self) -> tuple[str, ...]:
         """The channels of groups that its frames have."""
-        count = len(self.groups.sizes) if self.groups else 0
+        count = len(self.lights.sizes) if self.lights else 0
         return ("group", "group_sample", *UNSHADOWED[:count]) if count else ()
 
     @turn()
@@ -63,7 +63,7 @@ class Renderer(View):
                              f"scene of more lights than '{self.scene.name}' has")
         before = index - 1 if index > 0 else None
         replayed = replay(self, index, before, seed) if set(channels) & set(REPLAY) else {}
-        _ = self.groups  # before the stage is set: to find them moves it
+        _ = self.lights  # before the stage is set: to find them moves it
         self.stage.set_frame(index)
         planes = self._trace_frame(index, seed, [c for c in channels if c not in REPLAY])
         dr.eval(planes)
@@ -104,7 +104,7 @@ class Renderer(View):
             if set(channels) & {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS}:
                 sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
                 radiance = trace(scene, ray, pi, sampler, self.scene.max_depth,
-                                 self.direct == "resampled", self.candidates, self.groups)
+                                 self.candidates, self.lights)
                 unit = dr.opaque(mi.Float, self.stage.unit)
                 planes = {
                     "color": radiance.emission + radiance.direct + radiance.indirect,

@@ -61,7 +61,7 @@ def replay(view: View, index: int, previous: int | None,
 def _shade_both(view: View, index: int, previous: int,
                 seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Row and column in this frame, luminances (n, 2) now and before, of the samples seen."""
-    stage, _ = view.stage, view.groups  # to find those moves the stage
+    stage, _ = view.stage, view.lights  # to find those moves the stage
     stage.set_frame(previous)
     pixel = aligned(mi.UInt32, _picks(view.height, view.width, seed, previous))
     rays = view.rays()
@@ -123,7 +123,7 @@ def _shade(view: View, random_frame: int, seed: int, pixel: mi.UInt32, point: mi
         seen = (id_ >= 0) & (met == id_) & (dr.abs(pi.t - distance) < TOLERANCE * distance)
         sampler = view.new_sampler(keys_from_seed(seed, FRAME_STREAM, random_frame), pixel)
         radiance = trace(scene, ray, pi, sampler, view.scene.max_depth,
-                         view.direct == "resampled", view.candidates, view.groups)
+                         view.candidates, view.lights)
         shaded = _Shaded(mi.luminance(radiance.direct), mi.luminance(radiance.indirect), seen)
     dr.eval(shaded.direct, shaded.indirect, shaded.seen)
     return shaded

@@ -14,9 +14,9 @@ from onespp.scenes.description import Scene
 
 from .camera_rays import NO_JITTER, Offset, PixelRays, halton, pixel_rays
 from .candidates import candidates_for
-from .light_groups import find_groups
-from .lights import LightGroups
+from .lights import Lights
 from .sampler import BlueNoise, Keys, Pcg, Sampler, Sobol, z_order
+from .scene_lights import find_lights
 
 _SAMPLERS: dict[str, Callable[[Keys, Any, int], Sampler]] = {
     "pcg": lambda keys, pixel, width: Pcg(keys, pixel),
@@ -58,10 +58,10 @@ class View:
         return self.direct == "resampled" and self.scene.max_depth > 1
 
     @cached_property
-    def groups(self) -> LightGroups | None:
-        """Of lights, each with a visibility of its own; None where there is one, or no split. To
-        find them moves the stage."""
-        return find_groups(self.stage) if self.splits else None
+    def lights(self) -> Lights | None:
+        """Those that direct light is resampled from, None without a split. To find them moves the
+        stage."""
+        return find_lights(self.stage) if self.splits else None
 
     def rays(self, jittered: bool = True) -> PixelRays:
         """Rays through points of the image, at the frame that the stage is set to.

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from onespp.denoise.catalog import build
-from onespp.denoise.metrics.tonemap import srgb_from_linear
+from onespp.denoise.metrics.image import Target
 from onespp.denoise.studies.tune import Case, Search, mean_psnr, neighbours, starting_point
 from onespp.render.channels import FRAME
 from onespp.render.files.manifest import Manifest
@@ -20,7 +21,7 @@ from tests.support.frames import make_frame, noisy
 def case():
     truth = make_frame(24, 28)
     frames = [noisy(truth, seed=i) for i in range(3)]
-    return Case("wall", frames, [srgb_from_linear(truth["color"])] * 3)
+    return Case("wall", frames, [Target(truth["color"])] * 3)
 
 
 def test_it_finds_better_parameters_than_bad_ones(case):
@@ -33,6 +34,20 @@ def test_it_finds_better_parameters_than_bad_ones(case):
         k: v for k, v in start.items() if k not in ("levels", "sigma_luminance")}
     method = build("atrous", {k: str(v) for k, v in best.items()})
     assert value == pytest.approx(mean_psnr(method, [case]))
+
+
+def test_the_noise_of_references_has_no_part_in_the_choice():
+    """A noisy reference in parts measures as the truth itself does."""
+    truth = make_frame(48, 56)
+    frames = [noisy(truth, seed=i) for i in range(3)]
+    rng = np.random.default_rng(0)
+    parts = [truth["color"] * rng.normal(1, 0.2, (4, 48, 56, 3)) for _ in frames]
+    method = build("atrous")
+    exact = mean_psnr(method, [Case("", frames, [Target(truth["color"])] * 3)])
+    halves = mean_psnr(method, [Case("", frames, [Target(p.mean(0), p) for p in parts])])
+    mean = mean_psnr(method, [Case("", frames, [Target(p.mean(0)) for p in parts])])
+    assert halves == pytest.approx(exact, abs=0.1)
+    assert mean < exact - 0.4
 
 
 def test_it_goes_on_from_what_it_had_tried(case, tmp_path, monkeypatch):

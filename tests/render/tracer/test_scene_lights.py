@@ -1,4 +1,4 @@
-"""Lights in groups, and what a shadow ray tells of the one that it went to."""
+"""Lights in strata and groups, and what a shadow ray tells of the group that it went to."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import pytest
 
 from onespp.render.channels import GROUPED, UNSHADOWED
 from onespp.render.errors import InputError
-from onespp.render.tracer.light_groups import share_out
 from onespp.render.tracer.renderer import Renderer
+from onespp.render.tracer.scene_lights import MOST_STRATA, SPARE, cut, share_out
 from onespp.scenes import catalog
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.materials import diffuse
@@ -38,21 +38,44 @@ def render(scene: Scene, seed: int = 0, **options):
 
 
 @pytest.mark.parametrize(("count", "sky", "sizes"), [
-    (1, False, None), (2, False, (1, 1)), (1, True, (1, 1)), (4, False, (1, 1, 1, 1))])
+    (1, False, ()), (2, False, (16, 16)), (1, True, (16, 16)), (4, False, (16,) * 4)])
 def test_as_many_as_the_scene_needs(count, sky, sizes):
     renderer = Renderer(lamps(count, sky), 8, 8, direct="resampled")
-    assert (renderer.groups and renderer.groups.sizes) == sizes
+    assert renderer.lights is not None
+    assert renderer.lights.sizes == sizes
     there = [c for c in renderer.channels if c in GROUPED]
     assert there == (["group", "group_sample", *UNSHADOWED[:len(sizes)]] if sizes else [])
 
 
 def test_lights_far_apart_share_a_group():
     """Eight lamps in a row: neighbours, which shine on the same floor, are told apart."""
-    renderer = Renderer(lamps(8), 8, 8, direct="resampled")
-    groups = renderer.groups
-    assert groups is not None
-    assert sorted(groups.sizes) == [2, 2, 2, 2]
-    assert (np.diff(groups.of_emitter.numpy().astype(int)) != 0).all()
+    lights = Renderer(lamps(8), 8, 8, direct="resampled").lights
+    assert lights is not None
+    assert lights.sizes == (32, 32, 32, 32)
+    group = lights.group.numpy().astype(int).reshape(8, 16)
+    assert (group == group[:, :1]).all()
+    assert (np.diff(group[:, 0]) != 0).all()
+
+
+def test_many_lights_share_a_bounded_number_of_strata():
+    """Twelve lamps and a sky: the sky, which gives most, is cut as finely as ever."""
+    lights = Renderer(lamps(12, True), 8, 8, direct="resampled").lights
+    assert lights is not None
+    emitter = lights.stratum.numpy() >> 8
+    assert len(emitter) <= MOST_STRATA
+    strata = np.bincount(emitter)
+    assert strata[-1] == 16
+    assert set(strata) <= {1, 4, 16}
+    assert sum(lights.sizes) == len(emitter)
+
+
+def test_strata_go_to_the_lights_that_give_most():
+    luminances = np.ones((300, 5))
+    luminances[7], luminances[9], luminances[11] = 1000, 100, 500
+    halvings = cut(luminances, np.arange(300) == 11)
+    assert halvings[7] == halvings[9] == 2
+    assert halvings[11] == 0  # at a point
+    assert 300 < (4**halvings).sum() <= 300 + SPARE
 
 
 def test_sharing_out_keeps_together_what_never_meets():
@@ -108,7 +131,7 @@ def test_groups_and_the_rest_are_all_of_unshadowed_light():
     assert total.sum() == pytest.approx(frame["unshadowed"].sum(), rel=0.01)  # lamps are small
 
 
-@pytest.mark.parametrize("scene", [lamps(6), lamps(2, True)], ids=["six", "sky"])
+@pytest.mark.parametrize("scene", [lamps(6), lamps(11, True)], ids=["six", "sky"])
 def test_picking_by_groups_keeps_the_mean_of_direct_light(scene):
     direct = {}
     for estimator in ("mis", "resampled"):

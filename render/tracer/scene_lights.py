@@ -1,0 +1,125 @@
+"""What is fixed about a scene's lights: how finely each is cut, and which group it is in.
+
+**Strata.** Up to `FEW` lights are cut into 4 x 4 strata each. Where there are more, each is cut
+into one at first, and those that give most for each of their strata, as a mean over points of the
+scene, are cut more finely while there are strata left: at most `MOST_STRATA`, or `SPARE` beside one
+for each light. So a pixel costs what it costs with a few lights, and the sky or a large lamp among
+many small ones keeps its 16. A light at a point or from one direction has one.
+
+**Groups.** Those of one group seldom shine on the same place: a visibility for each group is noise
+only where two of its lights meet. With u_e the luminance that emitter e would give a point of the
+image if nothing were in its way, the share of light that may be told wrongly there is at most the
+sum over pairs of a group of
+
+    2 u_e u_f / (sum_e u_e)^2,
+
+and lights are shared out so that the mean of it, over some points of some frames of the scene, is
+small: the strongest first, each to where it adds least, then moved while that helps. The groups are
+the scene's: they are the same in all of its frames, at any size, so that a group has a history.
+"""
+
+from __future__ import annotations
+
+import drjit as dr
+import numpy as np
+
+from onespp.render.channels import MOST_GROUPS
+from onespp.render.host.aligned import aligned
+from onespp.render.mitsuba.scene import MitsubaScene
+from onespp.render.mitsuba.variant import mi
+
+from .camera_rays import pixel_rays
+from .lights import Lights, contribution, stratum_word
+
+FEW = 8
+MOST_STRATA = 128
+SPARE = 64
+
+_HEIGHT, _WIDTH = 18, 32
+_FRAMES = 4  # of the scene that are looked at
+_ROUNDS = 10
+
+
+def find_lights(stage: MitsubaScene) -> Lights:
+    """The strata of a scene's lights, in groups where it has several. May move the stage."""
+    emitters = stage.mi_scene.emitters()
+    count = len(emitters)
+    delta = np.array([mi.has_flag(e.flags(), mi.EmitterFlags.Delta) for e in emitters], bool)
+    halvings, groups = np.where(delta, 0, 2), np.arange(count)
+    if count > min(FEW, MOST_GROUPS):
+        last = stage.description.frames - 1
+        at = sorted({round(last * i / (_FRAMES - 1)) for i in range(_FRAMES)})
+        luminances = np.concatenate([_luminances(stage, i) for i in at], axis=1)
+        if count > MOST_GROUPS:
+            groups = share_out(luminances)
+        if count > FEW:
+            halvings = cut(luminances, delta)
+    words = [stratum_word(e, n, cell) for e, n in enumerate(halvings) for cell in range(4**n)]
+    group = np.repeat(groups, 4**halvings)
+    sizes = np.bincount(group) if count > 1 else ()
+    return Lights(aligned(mi.UInt32, np.array(words, np.uint32)),
+                  aligned(mi.UInt32, group.astype(np.uint32)), tuple(map(int, sizes)), count)
+
+
+def cut(luminances: np.ndarray, delta: np.ndarray) -> np.ndarray:
+    """How often the sides of each light are halved, (lights,) 0, 1 or 2, of (lights, points)
+    luminances.
+
+    Args:
+        delta: (lights,) bool, those at a point or from one direction: 0.
+    """
+    given = (luminances / np.maximum(luminances.sum(0), 1e-30)).mean(1)
+    halvings = np.zeros(len(given), int)
+    left = max(MOST_STRATA - len(given), SPARE)
+    while True:
+        strata = 4**halvings
+        finer = np.where(~delta & (halvings < 2) & (3 * strata <= left), given / strata, 0)
+        light = int(np.argmax(finer))
+        if finer[light] <= 0:
+            return halvings
+        left -= 3 * strata[light]
+        halvings[light] += 1
+
+
+def share_out(luminances: np.ndarray, count: int = MOST_GROUPS) -> np.ndarray:
+    """Group of each light, (lights,) int, of (lights, points) luminances; no group is empty."""
+    share = luminances / np.maximum(luminances.sum(0), 1e-30)
+    together = share @ share.T
+    np.fill_diagonal(together, 0)
+    order = np.argsort(-share.sum(1), kind="stable")
+    groups = np.full(len(share), -1)
+    groups[order[:count]] = range(count)
+
+    def best(e: int) -> int:
+        return int(np.argmin([together[e, groups == g].sum() for g in range(count)]))
+
+    for e in order[count:]:
+        groups[e] = best(e)
+    for _ in range(_ROUNDS):
+        before = groups.copy()
+        for e in order:
+            if (groups == groups[e]).sum() > 1:
+                groups[e] = best(e)
+        if (before == groups).all():
+            break
+    return groups
+
+
+def _luminances(stage: MitsubaScene, index: int) -> np.ndarray:
+    """(emitters, points) of what each light would give points of a frame."""
+    stage.set_frame(index)
+    scene = stage.mi_scene
+    emitters, points = len(scene.emitters()), _HEIGHT * _WIDTH
+    lane = dr.arange(mi.UInt32, emitters * points)
+    emitter, point = lane // points, lane % points
+    row = point // _WIDTH
+    with dr.suspend_grad():
+        ray, _ = pixel_rays(stage, _HEIGHT, _WIDTH).at(
+            mi.Float(point - row * _WIDTH) + 0.5, mi.Float(row) + 0.5)
+        si = scene.ray_intersect(ray)
+        total = mi.Float(0)
+        for cell in (5, 6, 9, 10):  # the middle of the light
+            c, _ = contribution(scene, si, stratum_word(emitter, 2, cell), mi.Point2f(0.5),
+                                si.is_valid())
+            total += mi.luminance(c)
+    return total.numpy().astype(np.float64).reshape(emitters, points)
