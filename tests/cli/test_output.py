@@ -24,11 +24,14 @@ def folder(tmp_path_factory):
     return make_report_sequence(tmp_path_factory.mktemp("streams"), 2).folder
 
 
-@pytest.mark.parametrize("redirection", [
-    ">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-", "| true", "2>&1 | true",
-    pytest.param("2>/dev/full", marks=pytest.mark.skipif(
+SCORE, COMPARE = "score {} --no-pictures", "compare {0}/{1} {0}/{1}"
+
+
+@pytest.mark.parametrize(("words", "redirection"), [
+    (SCORE, ">&-"), (SCORE, "2>&-"), (SCORE, ">&- 2>&-"), (SCORE, "<&- >&- 2>&-"),
+    (SCORE, "| true"), (SCORE, "2>&1 | true"), (COMPARE, "2>&1 | true"),
+    pytest.param(SCORE, "2>/dev/full", marks=pytest.mark.skipif(
         not os.path.exists("/dev/full"), reason="no device that is always full"))])
-@pytest.mark.parametrize("words", ["score {} --no-pictures", "compare {0}/{1} {0}/{1}"])
 def test_a_closed_stream_ends_no_job(folder, words, redirection):
     scores = folder / "scores.json"
     scores.unlink(missing_ok=True)

@@ -29,10 +29,10 @@ def test_unshadowed_light_has_no_noise(name):
 
 @pytest.mark.parametrize("name", ["box", "room"])
 def test_visibility_times_unshadowed_light_has_the_mean_of_direct_light(name):
-    renderer = Renderer(catalog.load(name), 16, 24, direct="resampled")
-    frames = [renderer.frame(2, seed, ("direct", *SPLIT)) for seed in range(200)]
-    product = [blocks(f["visibility"][..., None] * f["unshadowed"], 8).mean(-1) for f in frames]
-    direct = [blocks(f["direct"], 8).mean(-1) for f in frames]
+    renderer = Renderer(catalog.load(name), 32, 48, direct="resampled")
+    frames = [renderer.frame(2, seed, ("direct", *SPLIT)) for seed in range(50)]
+    product = [blocks(f["visibility"][..., None] * f["unshadowed"], 16).mean(-1) for f in frames]
+    direct = [blocks(f["direct"], 16).mean(-1) for f in frames]
     # The colour of several lights is mixed by luminance in the product: allow 3 % beside chance.
     mean, variance = mean_and_variance(product)
     other, other_variance = mean_and_variance(direct)

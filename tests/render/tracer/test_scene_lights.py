@@ -135,9 +135,9 @@ def test_groups_and_the_rest_are_all_of_unshadowed_light():
 def test_picking_by_groups_keeps_the_mean_of_direct_light(scene):
     direct = {}
     for estimator in ("mis", "resampled"):
-        renderer = Renderer(scene, 16, 24, direct=estimator)
-        frames = [renderer.frame(1, seed, ("direct",))["direct"] for seed in range(150)]
-        direct[estimator] = mean_and_variance([blocks(f, 4).mean(-1) for f in frames])
+        renderer = Renderer(scene, 32, 48, direct=estimator)
+        frames = [renderer.frame(1, seed, ("direct",))["direct"] for seed in range(40)]
+        direct[estimator] = mean_and_variance([blocks(f, 8).mean(-1) for f in frames])
     assert_same_mean(*direct["resampled"], *direct["mis"])
 
 
