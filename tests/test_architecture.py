@@ -12,6 +12,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -62,8 +63,9 @@ NEVER = {  # module -> what it never imports
 }
 
 
+@cache
 def sources() -> dict[str, str]:
-    """Module -> its source, for all of the installed package."""
+    """Module -> its source, for all of the installed package. (Not to be changed.)"""
     found = {}
     for top in ("onespp", "scenes", "render", "denoise"):
         for path in sorted((ROOT / top).rglob("*.py")):
@@ -76,14 +78,20 @@ def sources() -> dict[str, str]:
     return found
 
 
+@cache
+def import_nodes(source: str) -> list[ast.Import | ast.ImportFrom]:
+    """All import statements of a source."""
+    return [n for n in ast.walk(ast.parse(source)) if isinstance(n, (ast.Import, ast.ImportFrom))]
+
+
 def imports(module: str, source: str, modules: Mapping[str, str]) -> Iterator[str]:
     """Full names of the modules that a module imports."""
     packages = {name.rpartition(".")[0] for name in modules}
     here = module if module in packages else module.rpartition(".")[0]
-    for node in ast.walk(ast.parse(source)):
+    for node in import_nodes(source):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             base = node.module or ""
             if node.level:
                 above = here.split(".")[:len(here.split(".")) - node.level + 1]

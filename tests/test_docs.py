@@ -7,6 +7,7 @@ import re
 import shlex
 import sys
 from dataclasses import replace
+from functools import cache
 from html.parser import HTMLParser
 from importlib.util import find_spec
 from itertools import pairwise
@@ -181,15 +182,20 @@ def test_links_of_the_sources_lead_to_files_and_headings(page):
             assert not anchor or anchor in slugs(other), f"{page} -> {target}"
 
 
+@cache
+def python_files() -> list[str]:
+    """Paths of the project's Python files, environments aside."""
+    return [path.relative_to(ROOT).as_posix() for top in ROOT.iterdir()
+            if top.is_dir() and top.name[0] != "." for path in top.rglob("*.py")]
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_files_that_are_named_exist(page):
     """`tests/test_x.py`, or the end of a path, as `tracer/path.py`."""
-    files = {path.relative_to(ROOT).as_posix() for path in ROOT.glob("*/**/*.py")
-             if not path.relative_to(ROOT).parts[0].startswith(".")}
     for code in CODE.findall(PAGES[page].read_text("utf-8")):
         for name in re.findall(r"[\w./]+\.py\b", code):
             if name not in UNKNOWN:
-                assert any(f"/{file}".endswith(f"/{name}") for file in files), f"{page}: {name}"
+                assert any(f"/{file}".endswith(f"/{name}") for file in python_files()), (page, name)
 
 
 def test_the_readme_is_one_page():

@@ -42,7 +42,7 @@ def test_visibility_times_unshadowed_light_has_the_mean_of_direct_light(name):
 @pytest.mark.parametrize(("name", "gain"), [("box", 3), ("room", 4)])
 def test_resampling_lowers_the_variance_of_direct_light(name, gain):
     variance = {direct: np.var([renderer.frame(2, seed, ("direct",))["direct"]
-                                for seed in range(60)], axis=0).mean()
+                                for seed in range(20)], axis=0).mean()
                 for direct in ("mis", "resampled")
                 for renderer in [Renderer(catalog.load(name), 24, 32, direct=direct)]}
     assert variance["mis"] > gain * variance["resampled"]
