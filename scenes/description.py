@@ -32,30 +32,42 @@ Motion = Callable[[float], Matrix]
 Material = Mapping[str, Any]
 Radiance = Color | np.ndarray | Mapping[str, Any]
 
+FOV_AXES = ("x", "y", "smaller", "larger")
 MOST_FRAMES, LARGEST_SIDE, LONGEST_PATH = 100_000, 16384, 10_000
 
-__all__ = ["Camera", "Color", "Cylinder", "Disk", "Geometry", "Material", "Mesh", "Motion",
-           "Rectangle", "Scene", "SceneError", "Shape", "Sphere"]
+__all__ = ["Camera", "Color", "Cylinder", "Disk", "Geometry", "Light", "Material", "Mesh",
+           "Motion", "Rectangle", "Scene", "SceneError", "Shape", "Sphere"]
+
+
+LATER = {"later": True}
+"""Metadata of a field that older scenes had not: at its default, `fingerprint` leaves it out."""
 
 
 @dataclass(frozen=True)
-class Sphere:
+class _Analytic:
+    """A shape that renderers know by name; flipped: it faces the other way."""
+
+    flipped: bool = field(default=False, metadata=LATER)
+
+
+@dataclass(frozen=True)
+class Sphere(_Analytic):
     """Unit sphere at the origin. Takes uniform scale only."""
 
 
 @dataclass(frozen=True)
-class Rectangle:
+class Rectangle(_Analytic):
     """The square [-1, 1]^2 in the xy plane, facing +z, uv in [0, 1]^2."""
 
 
 @dataclass(frozen=True)
-class Disk:
+class Disk(_Analytic):
     """Unit disk in the xy plane, facing +z."""
 
 
 @dataclass(frozen=True)
-class Cylinder:
-    """Open unit-radius tube from z = 0 to z = 1, facing outward. Takes uniform scale only."""
+class Cylinder(_Analytic):
+    """Open unit-radius tube from z = 0 to z = 1, facing outward; x and y take one scale only."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,22 +193,48 @@ class Shape:
 
 
 @dataclass(frozen=True)
+class Light:
+    """A light that is no shape: it comes from a point or a direction, and no path runs into it.
+
+    Attributes:
+        emitter: a Mitsuba dictionary of type "point" (of "intensity"), "spot" (along +z, of
+            "intensity", "cutoff_angle", "beam_width" and "texture") or "directional" (along +z, of
+            "irradiance").
+        world_from_light: where it is; it does not move.
+    """
+
+    emitter: Mapping[str, Any]
+    world_from_light: Matrix = field(default_factory=identity)
+
+    def __post_init__(self) -> None:
+        validity.light(self.emitter, "a light")
+        place = validity.matrix(self.world_from_light, "the place of a light")
+        object.__setattr__(self, "world_from_light", place)
+
+
+@dataclass(frozen=True)
 class Camera:
     """A pinhole camera.
 
     Attributes:
         world_from_camera: a matrix (see `transforms.look_at`), or a function of the frame.
             Camera space: x right, y down, z forward; a rigid transform (to 1e-4).
-        fov: vertical field of view, degrees.
+        fov: field of view, degrees.
+        fov_axis: what it spans: "y" the picture's height, "x" its width, or whichever of the two
+            is "smaller" or "larger".
     """
 
     world_from_camera: Matrix | Motion
     fov: float = 40.0
+    fov_axis: str = field(default="y", metadata=LATER)
 
     def __post_init__(self) -> None:
         fov = validity.number(self.fov, "the camera's field of view")
         if not 0.01 <= fov <= 179:
             raise SceneError(f"the camera's field of view is {self.fov} degrees: use 0.01 to 179")
+        if self.fov_axis not in FOV_AXES:
+            raise SceneError(f"the camera's fov_axis is {validity.brief(self.fov_axis)}: use "
+                             f"{', '.join(FOV_AXES[:-1])} or {FOV_AXES[-1]}")
         if not callable(self.world_from_camera):
             place = validity.rigid(self.world_from_camera, "the place of 'camera'")
             object.__setattr__(self, "world_from_camera", place)
@@ -218,7 +256,9 @@ class Camera:
 
         The third coordinate is 1 / depth, so that the matrix can be inverted.
         """
-        focal = 0.5 * height / np.tan(np.radians(self.fov) / 2)
+        spanned = {"y": height, "x": width, "smaller": min(height, width),
+                   "larger": max(height, width)}[self.fov_axis]
+        focal = 0.5 * spanned / np.tan(np.radians(self.fov) / 2)
         return np.array([[focal, 0, width / 2, 0],
                          [0, focal, height / 2, 0],
                          [0, 0, 0, 1],
@@ -237,7 +277,10 @@ class Scene:
         max_depth: longest path in segments, camera ray included (2: direct light only),
             as in Mitsuba's `path`.
         environment: radiance of everything that is not a shape: (r, g, b), a number, or an
-            (h, w, 3) image by latitude (from +y down) and longitude, or the path of one; or None.
+            (h, w, 3) image by latitude (from +y down) and longitude, or the path of one; or a
+            Mitsuba dictionary of type "envmap" (of "filename" or "bitmap"), "constant" or "sunsky",
+            which may be turned by "to_world", a matrix; or None.
+        lights: those that are no shapes.
     """
 
     name: str
@@ -250,6 +293,7 @@ class Scene:
     max_depth: int = 6
     fps: float = 24
     environment: float | str | Path | Radiance | None = None
+    lights: tuple[Light, ...] = ()
 
     def __post_init__(self) -> None:
         what = f"scene '{validity.text(self.name, 'the name of a scene', 100)}' has"
@@ -280,11 +324,17 @@ class Scene:
         fps = validity.number(self.fps, f"{what} fps that")
         if not 1 <= fps <= 1000:
             raise SceneError(f"{what} fps = {self.fps}: use 1 to 1000")
+        lights = tuple(self.lights) if isinstance(self.lights, Iterable) else (self.lights,)
+        for light in lights:
+            if not isinstance(light, Light):
+                raise SceneError(f"{what} {validity.brief(light)} among its lights: use Light(...) "
+                                 "only")
+        object.__setattr__(self, "lights", lights)
         if self.environment is not None:
             around = validity.environment(self.environment,
                                           f"the environment of scene '{self.name}'")
             object.__setattr__(self, "environment", around)
-        elif all(shape.emission is None for shape in self.shapes):
+        elif not lights and all(shape.emission is None for shape in self.shapes):
             raise SceneError(f"scene '{self.name}' has no light: give a shape an emission, "
                              "or the scene an environment")
 

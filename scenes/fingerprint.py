@@ -1,7 +1,7 @@
 """A short hash of what a scene is, so that a data set can tell whether its scene was edited.
 
-It covers all that a renderer reads of a scene: shapes, arrays, materials, the camera, what moves or
-changes, and the contents of files that a material or the environment names (not their paths, so a
+It covers all that a renderer reads of a scene: shapes, arrays, materials, lights, the camera, what
+moves or changes, and the contents of files that a material or the environment names (not their paths, so a
 folder may be moved). It does not cover who renders: versions of packages and the device are in the
 manifest, where they tell, and do not forbid, that a sequence was continued on another machine.
 """
@@ -31,6 +31,8 @@ def fingerprint(scene: Scene, times: Sequence[float] | None = None) -> str:
     for part in (scene.shapes, scene.camera, scene.max_depth):
         _feed(digest, part, times)
     _feed(digest, scene.environment, times, names_a_file=True)
+    if scene.lights:
+        _feed(digest, scene.lights, times)
     return digest.hexdigest()[:16]
 
 
@@ -59,6 +61,8 @@ def _feed(digest: Any, value: Any, times: Sequence[float], names_a_file: bool = 
         value = array.tolist()
     if is_dataclass(value):
         for field in fields(value):
+            if field.metadata.get("later") and getattr(value, field.name) == field.default:
+                continue
             _feed(digest, getattr(value, field.name), times)
     elif isinstance(value, Mapping):
         digest.update(f"{len(value)};".encode())

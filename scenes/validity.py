@@ -35,6 +35,9 @@ _NOT_NEGATIVE = frozenset(("alpha", "alpha_u", "alpha_v", "eta", "k", "specular"
                            "diff_trans"))
 _INDICES = frozenset(("int_ior", "ext_ior"))  # one is divided by the other
 _OF_A_TEXTURE = frozenset(("bitmap", "color0", "color1", "value"))  # as its property is bounded
+ENVIRONMENTS = ("envmap", "constant", "sunsky")
+LIGHTS = ("point", "spot", "directional")
+VECTORS = frozenset(("position", "direction", "sun_direction"))
 PLACEMENTS = ("uv_from_surface", "to_uv")
 _DEEPEST = 16
 LARGEST = 1e30  # Mitsuba computes in float32, where 1e39 is infinite
@@ -180,7 +183,8 @@ def emission(value: Any, what: str) -> tuple[float, float, float] | np.ndarray |
 
 
 def environment(value: Any, what: str) -> tuple[float, float, float] | np.ndarray | Mapping:
-    """Radiance from all around: a number, a colour, an (h, w, 3) image, or an image's path.
+    """Radiance from all around: a number, a colour, an (h, w, 3) image, an image's path, or a
+    dictionary of Mitsuba's.
 
     A path becomes Mitsuba's dictionary of it, {"type": "envmap", "filename": ...}.
     """
@@ -190,12 +194,40 @@ def environment(value: Any, what: str) -> tuple[float, float, float] | np.ndarra
         for kind, key in (("envmap", "filename"), ("envmap", "bitmap"), ("constant", "radiance")):
             if value.get("type") == kind and set(value) == {"type", key}:
                 return environment(value[key], what)
-        raise SceneError(f"{what} is {brief(dict(value))}: use a number, a colour, an image, or "
-                         "the path of one")
+        if value.get("type") not in ENVIRONMENTS:
+            raise SceneError(f"{what} is {brief(dict(value))}: use a number, a colour, an image, "
+                             f"the path of one, or a dictionary of type {', '.join(ENVIRONMENTS)}")
+        if value["type"] == "envmap" and ("filename" in value) == ("bitmap" in value):
+            raise SceneError(f"{what} is an envmap without an image, or with two: give it either a "
+                             "\"bitmap\" or a \"filename\"")
+        return _emitter(value, what)
     found = _radiance(value, what)
     if isinstance(found, np.ndarray) and found.shape[2:] != (3,):
         raise SceneError(f"{what} is an image of shape {found.shape}: use (h, w, 3)")
     return found
+
+
+def light(value: Any, what: str) -> Mapping[str, Any]:
+    """A light that is no shape, a dictionary of Mitsuba's."""
+    if not isinstance(value, Mapping) or value.get("type") not in LIGHTS:
+        raise SceneError(f"{what} is {brief(value)}: use a dictionary of type {', '.join(LIGHTS)}")
+    if "to_world" in value or not VECTORS.isdisjoint(value):
+        raise SceneError(f"{what} has a place among its properties: give it as world_from_light")
+    return _emitter(value, what)
+
+
+def _emitter(value: Mapping[str, Any], what: str) -> Mapping[str, Any]:
+    """A dictionary of an emitter of Mitsuba's, whose matrices and vectors are numbers."""
+    place = Place(what)
+    for key, part in value.items():
+        if key == "to_world":
+            matrix(part, str(place.inside(key)))
+        elif key in VECTORS:
+            if _numbers(part, str(place.inside(key))).shape != (3,):
+                raise SceneError(f"{place.inside(key)} is {brief(part)}: use three numbers")
+    _check_plugin({key: part for key, part in value.items()
+                   if key not in VECTORS and key != "to_world"}, place, RADIANCE, 0)
+    return value
 
 
 def _radiance(value: Any, what: str) -> tuple[float, float, float] | np.ndarray:

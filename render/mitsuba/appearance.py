@@ -65,19 +65,23 @@ class Appearance:
         self._untold: list[mi.BSDF] = []
         rows = np.zeros((3, size), np.uint32)  # which of the lists' entries, from 1; 0: none
         nothing = dr.zeros(mi.SurfaceInteraction3f)
+        shapes_of: dict[int, list[int]] = {}  # shapes that share a BSDF
         for index, bsdf in bsdf_from_shape.items():
+            shapes_of.setdefault(id(bsdf), []).append(index)
+        for shapes in shapes_of.values():
+            bsdf = bsdf_from_shape[shapes[0]]
             if _varies(bsdf):
                 self._varying.append(bsdf)
-                rows[0, index] = len(self._varying)
+                rows[0, shapes] = len(self._varying)
             else:
                 with dr.suspend_grad():
-                    alphas[index] = _alpha(bsdf, nothing, mi.Bool(True)).numpy()[0]
+                    alphas[shapes] = _alpha(bsdf, nothing, mi.Bool(True)).numpy()[0]
             if _is_mapped(bsdf):
                 self._mapped.append(bsdf)
-                rows[1, index] = len(self._mapped)
+                rows[1, shapes] = len(self._mapped)
             if not _is_told(bsdf):
                 self._untold.append(bsdf)
-                rows[2, index] = len(self._untold)
+                rows[2, shapes] = len(self._untold)
         self._alphas, self._untold_row = mi.Float(alphas), mi.UInt32(rows[2])
         self._varying_row, self._mapped_row = mi.UInt32(rows[0]), mi.UInt32(rows[1])
 

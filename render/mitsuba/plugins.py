@@ -72,16 +72,59 @@ def area_light(radiance: Any, what: str, of_mesh: bool = False) -> Any:
 
 
 def environment(radiance: Any, what: str) -> Any:
-    """Light from all around: of a colour, an (h, w, 3) image, or {"filename": ...} of one."""
+    """Light from all around: of a colour, an (h, w, 3) image, or a dictionary of Mitsuba's."""
     if isinstance(radiance, tuple):
         return _load({"type": "constant", "radiance": _rgb(radiance)}, what)
-    if isinstance(radiance, Mapping):
-        radiance = _read(radiance["filename"], what, validity.RADIANCE)
-        if radiance.shape[2:] != (3,):
-            radiance = np.repeat(radiance.reshape(*radiance.shape[:2], 1), 3, axis=2)
-    rows, columns = (-(-least // size) for least, size in zip(_SMALLEST_MAP, radiance.shape))
-    radiance = np.repeat(np.repeat(radiance, rows, 0), columns, 1)
-    return _load({"type": "envmap", "bitmap": mi.Bitmap(radiance.astype(np.float32))}, what)
+    if not isinstance(radiance, Mapping):
+        radiance = {"type": "envmap", "bitmap": radiance}
+    if radiance["type"] != "envmap":
+        return _load(_emitter(radiance, Place(what)), what)
+    made = _emitter({key: value for key, value in radiance.items()
+                     if key not in ("filename", "bitmap")}, Place(what))
+    return _load({**made, "bitmap": mi.Bitmap(_map(radiance, what).astype(np.float32))}, what)
+
+
+def _map(radiance: Mapping[str, Any], what: str) -> np.ndarray:
+    """The image of an environment map, (h, w, 3), as large as Mitsuba's smallest or larger."""
+    if "filename" in radiance:
+        pixels = _read(radiance["filename"], what, validity.RADIANCE)
+        if pixels.shape[2:] != (3,):
+            pixels = np.repeat(pixels.reshape(*pixels.shape[:2], 1), 3, axis=2)
+    else:
+        pixels = np.asarray(radiance["bitmap"])
+    rows, columns = (-(-least // size) for least, size in zip(_SMALLEST_MAP, pixels.shape))
+    return np.repeat(np.repeat(pixels, rows, 0), columns, 1)
+
+
+def light(emitter: Mapping[str, Any], place: np.ndarray, unit: float, what: str) -> Any:
+    """A light that is no shape, at a place in a stage of that unit.
+
+    Light from a point falls with the square of the distance, in stage units: its intensity is per
+    square of one.
+    """
+    made = _emitter(emitter, Place(what)) | {"to_world": mi.ScalarTransform4f(place.tolist())}
+    loaded = _load(made, what)
+    if emitter["type"] == "directional" or unit == 1:
+        return loaded
+    parameters = mi.traverse(loaded)
+    key = next((key for key, _ in parameters if key.startswith("intensity.")), None)
+    if key is None:
+        raise SceneError(f"{what} has a texture as its intensity: use a colour, (r, g, b)")
+    parameters[key] = parameters[key] / unit**2
+    parameters.update()
+    return loaded
+
+
+def _emitter(value: Mapping[str, Any], place: Place) -> dict[str, Any]:
+    made: dict[str, Any] = {}
+    for key, part in value.items():
+        if key == "to_world":
+            made[key] = mi.ScalarTransform4f(np.asarray(part, float).tolist())
+        elif key in validity.VECTORS:
+            made[key] = list(map(float, part))
+        else:
+            made[key] = plugin(part, place.inside(key), validity.RADIANCE)
+    return made
 
 
 def plugin(value: Any, place: Place, bounds: validity.Bounds = validity.ANY) -> Any:

@@ -65,12 +65,17 @@ class MitsubaScene:
         self._mirrored = {shape.name: _mirrors(shape.world_from_object_at(frame))
                           for shape in description.shapes}
         self._ids = {name: f"shape_{i:06d}" for i, name in enumerate(description.object_names)}
+        self._bsdfs: dict[int, Any] = {}
         scene: dict[str, Any] = {"type": "scene"}
         for shape in description.shapes:
             scene[self._ids[shape.name]] = self._load_shape(shape, frame)
         if description.environment is not None:
             scene["environment"] = plugins.environment(
                 description.environment, f"the environment of scene '{description.name}'")
+        for i, light in enumerate(description.lights):
+            scene[f"light_{i:06d}"] = plugins.light(
+                light.emitter, self._local(light.world_from_light), self.unit,
+                f"light {i} of scene '{description.name}'")
         self.mi_scene = mi.load_dict(scene, parallel=False, optimize=False)
         self._parameters = mi.traverse(self.mi_scene)
         self.id_from_registry = self._registry_table()
@@ -138,7 +143,7 @@ class MitsubaScene:
         world_from_sensor = self._local(camera.world_from_camera_at(self.frame)) @ np.diag(
             [-self.unit, -self.unit, self.unit, 1.0])
         return mi.load_dict({
-            "type": "perspective", "fov": camera.fov, "fov_axis": "y",
+            "type": "perspective", "fov": camera.fov, "fov_axis": camera.fov_axis,
             "near_clip": 1e-4, "far_clip": 1e6,
             "to_world": mi.ScalarTransform4f(world_from_sensor.tolist()),
             "film": {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",
@@ -154,15 +159,22 @@ class MitsubaScene:
 
     def _load_shape(self, shape: Shape, frame: float) -> Any:
         emission = shape.emission_at(frame)
-        parts = {"bsdf": plugins.bsdf(shape.material, f"the material of shape '{shape.name}'")}
+        parts = {"bsdf": self._bsdf(shape)}
         if emission is not None:
             parts["emitter"] = plugins.area_light(
                 emission, f"the emission of shape '{shape.name}'", isinstance(shape.geometry, Mesh))
         local = self._local(shape.world_from_object_at(frame))
         if isinstance(shape.geometry, Mesh):
             return self._load_mesh(shape, local, parts)
-        return {"type": _ANALYTIC[type(shape.geometry)],
+        return {"type": _ANALYTIC[type(shape.geometry)], "flip_normals": shape.geometry.flipped,
                 "to_world": mi.ScalarTransform4f(_checked(shape, local).tolist()), **parts}
+
+    def _bsdf(self, shape: Shape) -> Any:
+        """What a shape is made of; shapes that have one material have one BSDF."""
+        key = id(shape.material)  # alive as long as the description is
+        if key not in self._bsdfs:
+            self._bsdfs[key] = plugins.bsdf(shape.material, f"the material of shape '{shape.name}'")
+        return self._bsdfs[key]
 
     def _load_mesh(self, shape: Shape, local: np.ndarray, parts: dict[str, Any]) -> mi.Mesh:
         geometry = shape.geometry
@@ -233,7 +245,8 @@ def _checked(shape: Shape, matrix: np.ndarray) -> np.ndarray:
                          "matrix flattens: scale all its axes by more than 0, or use a mesh")
     if isinstance(shape.geometry, Sphere | Cylinder):
         sizes = np.linalg.norm(matrix[:3, :3], axis=0)
-        if sizes.max() > sizes.min() * (1 + 1e-6):
+        round_ = sizes[:2] if isinstance(shape.geometry, Cylinder) else sizes
+        if round_.max() > round_.min() * (1 + 1e-6):
             raise SceneError(f"shape '{shape.name}' is a {type(shape.geometry).__name__} with "
                              f"non-uniform scale {np.round(sizes, 4).tolist()}: use a mesh")
         axes = matrix[:3, :3] / sizes
