@@ -1,9 +1,10 @@
 """A short hash of what a scene is, so that a data set can tell whether its scene was edited.
 
 It covers all that a renderer reads of a scene: shapes, arrays, materials, lights, the camera, what
-moves or changes, and the contents of files that a material or the environment names (not their paths, so a
-folder may be moved). It does not cover who renders: versions of packages and the device are in the
-manifest, where they tell, and do not forbid, that a sequence was continued on another machine.
+moves or changes, and the contents of files that a material or the environment names (not their
+paths, so a folder may be moved). What older scenes had not counts only where it is not as it was
+then. It does not cover who renders: versions of packages and the device are in the manifest, where
+they tell, and do not forbid, that a sequence was continued on another machine.
 """
 
 from __future__ import annotations

@@ -222,9 +222,8 @@ def _emitter(value: Mapping[str, Any], what: str) -> Mapping[str, Any]:
     for key, part in value.items():
         if key == "to_world":
             matrix(part, str(place.inside(key)))
-        elif key in VECTORS:
-            if _numbers(part, str(place.inside(key))).shape != (3,):
-                raise SceneError(f"{place.inside(key)} is {brief(part)}: use three numbers")
+        elif key in VECTORS and _numbers(part, str(place.inside(key))).shape != (3,):
+            raise SceneError(f"{place.inside(key)} is {brief(part)}: use three numbers")
     _check_plugin({key: part for key, part in value.items()
                    if key not in VECTORS and key != "to_world"}, place, RADIANCE, 0)
     return value

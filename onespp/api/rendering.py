@@ -19,9 +19,10 @@ from onespp.render.files.sequence import FrameSequence
 from onespp.render.host.memory import require_memory
 from onespp.render.host.turns import turn
 from onespp.scenes import catalog
-from onespp.scenes.description import Scene, SceneError
+from onespp.scenes.description import Scene
 
 from .caller import caller, public
+from .loading import load
 
 LARGEST_SIDE = 16384
 
@@ -38,7 +39,8 @@ def render(scene: str | Path | Scene, out: Path | str | None = None, *,
     What the folder holds already is not rendered again: the same call goes on where it was stopped.
 
     Args:
-        scene: a name of `onespp.scenes()`, the path of a `.py` file, or a `Scene`.
+        scene: as for `load`: a name of `onespp.scenes()`, the path of a `.py` file or of a Mitsuba
+            3 `.xml` file, or a `Scene`.
         out: folder of the sequence. None: a temporary one that is removed when Python ends, so
             that a cell can be run again with other sizes; give a folder to keep the frames.
         frames: how many, from frame 0 on, or their numbers, increasing; default all.
@@ -73,7 +75,7 @@ def render(scene: str | Path | Scene, out: Path | str | None = None, *,
         >>> sequence.frames, sequence.read_frame(1)["color"].shape
         ([0, 1], (12, 16, 3))
     """
-    made = scene if isinstance(scene, Scene) else _loaded(scene)
+    made = load(scene)
     height, width = (made.height, made.width) if size is None else _size(size)
     numbers = _numbers(frames, made)
     if seed < 0:
@@ -127,13 +129,6 @@ def scenes() -> dict[str, str]:
         True
     """
     return {name: catalog.load(name).about for name in catalog.names()}
-
-
-def _loaded(scene: str | Path) -> Scene:
-    if not isinstance(scene, str | Path):
-        raise SceneError(f"a scene is a {type(scene).__name__}: use a name of onespp.scenes(), the "
-                         "path of a .py file, or a onespp.Scene")
-    return catalog.load(str(scene))
 
 
 def _size(size: tuple[int, int]) -> tuple[int, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 from onespp.api.rendering import LARGEST_SIDE
 from onespp.render.errors import InputError
@@ -21,3 +22,18 @@ def parse_size(text: str) -> tuple[int, int]:
     if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE):
         raise InputError(f"--size {text} is out of range: both sides must be 1 to {LARGEST_SIDE}")
     return height, width
+
+
+def parse_settings(texts: Iterable[str], option: str = "-D") -> dict[str, str]:
+    """Values by name, of texts NAME=VALUE.
+
+    Raises:
+        InputError: one has another form.
+    """
+    made = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not (name and equals):
+            raise InputError(f"{option} {text} is not understood: use {option} NAME=VALUE")
+        made[name] = value
+    return made

@@ -30,10 +30,20 @@ overwrite_option = click.option(
          "default resume.")
 
 
+scene_options = (
+    click.option("-D", "--define", "define", multiple=True, metavar="NAME=VALUE",
+                 help="Value of a parameter, $NAME, of a Mitsuba XML file; may be given several "
+                      "times."),
+    click.option("--sensor", type=int, default=0, show_default=True, metavar="N",
+                 help="Which camera of a Mitsuba XML file, from 0."),
+)
+
+
 def render_options(command):
     """Options of every command that renders."""
     for option in reversed((
         frames_option,
+        *scene_options,
         click.option("--size", metavar="WxH", help="Pixels, as 640x360; default the scene's."),
         click.option("--seed", default=0, show_default=True, metavar="N",
                      help="Seed of all random numbers."),

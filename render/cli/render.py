@@ -7,12 +7,12 @@ from pathlib import Path
 import click
 
 from onespp.api import rendering as api
+from onespp.api.loading import load
 from onespp.render.files.frame_ranges import parse_frames
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import FrameSequence
-from onespp.scenes import catalog
 
-from .arguments import parse_size
+from .arguments import parse_settings, parse_size
 from .options import overwrite_option, render_options, use
 from .terminal import command_line
 
@@ -23,7 +23,7 @@ from .terminal import command_line
               help="Folder of the sequence; default data/SCENE.")
 @render_options
 def render(scene: str, out: Path | None, device: str, threads: int | None, **options) -> None:
-    """Render SCENE (a name, or a path to a scene file) at one sample a pixel.
+    """Render SCENE (a name, a Python file, or a Mitsuba XML file) at one sample a pixel.
 
     Running the same command again renders what is missing.
     """
@@ -32,10 +32,11 @@ def render(scene: str, out: Path | None, device: str, threads: int | None, **opt
     click.echo(f"rendered {len(sequence.frames)} frames into {sequence.folder}")
 
 
-def render_to(scene: str, out: Path | None, *, frames: str | None = None, size: str | None = None,
-              **options) -> FrameSequence:
+def render_to(name: str, out: Path | None, *, frames: str | None = None, size: str | None = None,
+              define: tuple[str, ...] = (), sensor: int = 0, **options) -> FrameSequence:
     """Do what the options of a command ask."""
-    return api.render(scene, out or Path("data") / catalog.load(scene).name,
+    scene = load(name, define=parse_settings(define), sensor=sensor)
+    return api.render(scene, out or Path("data") / scene.name,
                       frames=None if frames is None else parse_frames(frames),
                       size=None if size is None else parse_size(size), **options)
 

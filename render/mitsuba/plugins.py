@@ -207,7 +207,7 @@ def _read(filename: Any, what: str, bounds: validity.Bounds) -> np.ndarray:
         values = np.array(bitmap.convert(form, mi.Struct.Type.Float32, srgb_gamma=False))
     except RuntimeError as error:
         raise SceneError(f"{what} is the file '{filename}', which is no image that can be read "
-                         f"({_plain(error)}): save it again as PNG, JPEG or EXR") from None
+                         f"({plain(error)}): save it again as PNG, JPEG or EXR") from None
     return validity.image(values, f"{what}, '{filename}',", bounds)
 
 
@@ -222,7 +222,7 @@ def _load(dictionary: dict[str, Any], what: str) -> Any:
         unknown = re.search(r'unreferenced propert.*? plugin of type "(\w+)":\s*- .*? "(.*?)"',
                             str(error), re.DOTALL)
         if unknown is None:
-            raise SceneError(f"{what} is not one that Mitsuba takes: {_plain(error)}") from None
+            raise SceneError(f"{what} is not one that Mitsuba takes: {plain(error)}") from None
         kind, name = unknown.groups()
         raise SceneError(f"{what} has a property '{name}', which a '{kind}' does not have: "
                          f"{_instead(kind, name)}") from None
@@ -235,7 +235,7 @@ def _tried(what: str) -> Iterator[None]:
         with dr.suspend_grad():
             yield
     except RuntimeError as error:
-        raise SceneError(f"{what} is not one that Mitsuba can evaluate: {_plain(error)}") from None
+        raise SceneError(f"{what} is not one that Mitsuba can evaluate: {plain(error)}") from None
 
 
 def _surface() -> Any:
@@ -244,7 +244,7 @@ def _surface() -> Any:
     return si
 
 
-def _plain(error: Exception) -> str:
+def plain(error: Exception | str) -> str:
     """What Mitsuba says, without where in its own code, on one line."""
     said = " ".join(str(error).split())
     said = re.sub(r"^\[parser\.cpp:\d+\] (At|While loading) dictionary node \"[^\"]*\": ", "", said)

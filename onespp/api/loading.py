@@ -1,0 +1,64 @@
+"""A scene by name, from a file of Python or of Mitsuba's, to render or to change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from onespp.render.errors import InputError
+from onespp.render.host.turns import turn
+from onespp.scenes import catalog
+from onespp.scenes.description import Scene, SceneError
+
+from .caller import caller, public
+
+_XML = ".xml"
+
+
+@public
+def load(scene: str | Path | Scene, *, define: Mapping[str, object] | None = None,
+         sensor: int = 0) -> Scene:
+    """A scene to render, or to change first.
+
+    A `Scene` is a frozen dataclass in plain Python and NumPy: `dataclasses.replace` makes another
+    of it, and each of its shapes may get a motion (see `onespp.scenes.animation`).
+
+    Args:
+        scene: a name of `onespp.scenes()`, the path of a `.py` file or of a Mitsuba 3 `.xml`
+            file, or a `Scene`, which is returned as it is.
+        define: values for the `$name` of an XML file, by name.
+        sensor: which of an XML file's cameras, from 0.
+
+    Raises:
+        SceneError: no such scene, or it cannot be rendered here; with the file and the line.
+        InputError: `define` or `sensor` for a scene that is no XML file.
+
+    Example:
+        >>> import onespp
+        >>> onespp.load("box").max_depth
+        6
+    """
+    if isinstance(scene, Scene):
+        return scene
+    if not isinstance(scene, str | Path):
+        raise SceneError(f"a scene is a {type(scene).__name__}: use a name of onespp.scenes(), the "
+                         "path of a .py or .xml file, or a onespp.Scene")
+    if not str(scene).lower().endswith(_XML):
+        if define or sensor:
+            option = "-D" if define else "--sensor"
+            raise InputError(f"{option} is for Mitsuba's XML files, and '{scene}' is none: leave "
+                             "it out")
+        return catalog.load(str(scene))
+    with turn():
+        from onespp.render.scene_files.mitsuba_xml import load_xml  # imports Mitsuba
+
+        values = {str(name): _text(value) for name, value in (define or {}).items()}
+        loaded = load_xml(Path(scene), values, sensor)
+    if loaded.unused:
+        caller().inform(f"of {Path(scene).name} is not used: {loaded.unused}")
+    return loaded.scene
+
+
+def _text(value: object) -> str:
+    """A value as XML has it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)

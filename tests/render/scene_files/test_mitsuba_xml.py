@@ -1,0 +1,274 @@
+"""Scenes of Mitsuba XML files look as Mitsuba's `path` makes them, or are refused in a sentence."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from onespp.render.mitsuba.scene import MitsubaScene
+from onespp.render.mitsuba.variant import mi
+from onespp.render.scene_files.mitsuba_xml import load_xml
+from onespp.render.tracer.renderer import Renderer
+from onespp.scenes.animation import spin
+from onespp.scenes.description import LONGEST_PATH, SceneError
+from onespp.scenes.fingerprint import fingerprint
+from tests.support.xml_scenes import SCENES, write_png
+
+PARTS = 4
+
+
+def scene_xml(inside: str, sensor: str = '<float name="fov" value="50"/>', depth: int = 3,
+              width: int = 24, height: int = 16) -> str:
+    return f"""<scene version="3.0.0">
+  <integrator type="path"><integer name="max_depth" value="{depth}"/></integrator>
+  <sensor type="perspective">{sensor}
+    <transform name="to_world"><lookat origin="0.5, 1.5, 4" target="0, 0.4, 0" up="0, 1, 0"/>
+    </transform>
+    <film type="hdrfilm"><integer name="width" value="{width}"/>
+      <integer name="height" value="{height}"/><rfilter type="box"/></film></sensor>
+  {inside}</scene>"""
+
+
+GROUND = """<shape type="rectangle" id="ground"><transform name="to_world"><scale value="4"/>
+  <rotate x="1" angle="-90"/></transform></shape>"""
+BALL = '<shape type="sphere" id="ball"><float name="radius" value="0.5"/></shape>'
+SKY = '<emitter type="constant"/>'
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "a.xml"
+    path.write_text(text)
+    return path
+
+
+def means(path: Path, spp: int) -> tuple[np.ndarray, np.ndarray]:
+    """(PARTS, 3) mean colours of independent renders, by Mitsuba and by us."""
+    scene = mi.load_file(str(path), **({"filter": "box"} if "$filter" in path.read_text() else {}))
+    theirs = np.stack([np.array(mi.render(scene, spp=spp, seed=i))[..., :3].mean((0, 1))
+                       for i in range(PARTS)])
+    description = load_xml(path).scene
+    renderer = Renderer(description, description.height, description.width)
+    ours = np.stack([renderer.sample_sum(0, 1, part, spp, antialias=True).mean((0, 1)) / spp
+                     for part in range(PARTS)])
+    return theirs, ours
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_is_as_bright_as_mitsubas(name: str, tmp_path: Path):
+    theirs, ours = means(SCENES[name](tmp_path), spp=64)
+    error = np.sqrt((theirs.var(0, ddof=1) + ours.var(0, ddof=1)) / PARTS)
+    off = abs(ours.mean(0) - theirs.mean(0))
+    assert (off < np.maximum(0.01 * theirs.mean(0), 3 * error)).all()
+    assert (error < 0.01 * theirs.mean(0)).all()  # else the line above says little
+
+
+@pytest.mark.parametrize("light", [
+    '<emitter type="point"><point name="position" value="1, 2, 1"/>'
+    '<rgb name="intensity" value="6, 5, 4"/></emitter>',
+    '<emitter type="spot"><rgb name="intensity" value="20, 30, 40"/>'
+    '<float name="cutoff_angle" value="25"/><transform name="to_world">'
+    '<lookat origin="1, 3, 1" target="0, 0, 0" up="1, 0, 0"/></transform></emitter>',
+    '<emitter type="directional"><vector name="direction" value="-1, -2, 0.5"/>'
+    '<spectrum name="irradiance" value="3"/></emitter>'])
+def test_lights_without_a_surface_give_the_same_pixels(light: str, tmp_path: Path):
+    path = written(tmp_path, scene_xml(GROUND + BALL + light, depth=2))
+    theirs = np.array(mi.render(mi.load_file(str(path)), spp=256))[..., :3]
+    scene = load_xml(path).scene
+    ours = Renderer(scene, 16, 24).sample_sum(0, 1, 0, 256, antialias=True) / 256
+    assert theirs.mean() > 0.02
+    assert abs(ours - theirs).mean() < 0.03 * theirs.mean()  # edges within pixels
+    np.testing.assert_allclose(ours.mean((0, 1)), theirs.mean((0, 1)), rtol=5e-3)
+
+
+def test_the_light_of_a_point_in_a_tiny_scene_falls_as_in_a_large_one(tmp_path: Path):
+    """Tiny scenes are built in units of their own."""
+    light = ('<emitter type="point"><point name="position" value="0, 2, 1"/>'
+             '<rgb name="intensity" value="6"/></emitter>')
+    scene = load_xml(written(tmp_path, scene_xml(GROUND + BALL + light, depth=2))).scene
+    small = np.diag([1e-3, 1e-3, 1e-3, 1])
+
+    def shrunk(matrix: np.ndarray, size: np.ndarray) -> np.ndarray:
+        moved = small @ matrix
+        moved[:3, :3] = size @ matrix[:3, :3]
+        return moved
+
+    assert not callable(scene.camera.world_from_camera)
+    tiny = dataclasses.replace(
+        scene,
+        shapes=tuple(dataclasses.replace(s, world_from_object=small @ s.world_from_object)
+                     for s in scene.shapes),
+        camera=dataclasses.replace(scene.camera, world_from_camera=shrunk(
+            scene.camera.world_from_camera, np.eye(3))),
+        lights=tuple(dataclasses.replace(light, world_from_light=shrunk(
+            light.world_from_light, np.eye(3))) for light in scene.lights))
+    large = Renderer(scene, 8, 8).frame(0)["color"]
+    assert MitsubaScene(tiny).unit < 1
+    np.testing.assert_allclose(Renderer(tiny, 8, 8).frame(0)["color"], large * 1e6, rtol=1e-3)
+
+
+@pytest.mark.parametrize("sensor", [
+    *(f'<float name="fov" value="50"/><string name="fov_axis" value="{axis}"/>'
+      for axis in ("x", "y", "smaller", "larger", "diagonal")),
+    '<string name="focal_length" value="35mm"/>'])
+def test_each_field_of_view_is_mitsubas(sensor: str, tmp_path: Path):
+    path = written(tmp_path, scene_xml(GROUND + SKY, sensor))
+    theirs = mi.load_file(str(path)).sensors()[0]
+    ray, _ = theirs.sample_ray(0, 0.5, mi.Point2f(1 / 24, 2 / 16), mi.Point2f(0.5))
+    scene = load_xml(path).scene
+    screen = scene.camera.screen_from_camera(16, 24) @ np.linalg.inv(
+        scene.camera.world_from_camera_at(0))
+    x, y, _, w = screen @ [*np.array(ray.o + 2 * ray.d).ravel(), 1]
+    np.testing.assert_allclose((x / w, y / w), (1, 2), atol=1e-3)
+
+
+SHAPES = {
+    "sphere": '<point name="center" value="0.1, 0.2, 0"/><float name="radius" value="0.7"/>',
+    "rectangle": "", "disk": "", "cube": "",
+    "cylinder": '<point name="p0" value="0, -0.5, 0"/><point name="p1" value="0.3, 1.5, 0"/>'
+                '<float name="radius" value="0.4"/>',
+    "obj": '<string name="filename" value="a.obj"/>',
+    "ply": '<string name="filename" value="a.ply"/><boolean name="face_normals" value="true"/>'}
+
+
+@pytest.mark.parametrize("flip", ["false", "true"])
+@pytest.mark.parametrize("turn", ["<rotate x='1' angle='40'/><rotate z='1' angle='20'/>",
+                                  "<scale x='-1'/><rotate y='1' angle='30'/>"])
+@pytest.mark.parametrize("plugin", SHAPES)
+def test_shapes_are_where_mitsubas_are_and_face_as_they_do(plugin: str, turn: str, flip: str,
+                                                           tmp_path: Path):
+    from onespp.scenes import meshes
+    from tests.support.xml_scenes import write_obj, write_ply
+
+    mesh = meshes.torus(0.8, 0.4, 12)
+    write_obj(tmp_path / "a.obj", mesh)
+    write_ply(tmp_path / "a.ply", mesh)
+    path = written(tmp_path, scene_xml(
+        f'<shape type="{plugin}">{SHAPES[plugin]}<boolean name="flip_normals" value="{flip}"/>'
+        f'<transform name="to_world">{turn}<translate y="0.3"/></transform></shape>{SKY}'))
+    theirs = mi.load_file(str(path))
+    stage = MitsubaScene(load_xml(path).scene)
+    grid = np.stack(np.meshgrid(np.linspace(-0.4, 0.45, 5), np.linspace(-0.4, 0.3, 4)), -1)
+    directions = np.concatenate([grid.reshape(-1, 2), -np.ones((20, 1))], 1)
+
+    def hit(scene, origin) -> tuple[np.ndarray, np.ndarray]:
+        eye = mi.Point3f(*map(float, np.array([0.1, 0.4, 3]) - origin))
+        si = scene.ray_intersect(mi.Ray3f(eye, mi.Vector3f(directions.T.astype(np.float32))))
+        return np.array(si.t), np.array(si.sh_frame.n).T
+
+    (t, n), (our_t, our_n) = hit(theirs, np.zeros(3)), hit(stage.mi_scene, stage.origin)
+    seen = np.isfinite(t)
+    assert seen.sum() >= 3
+    np.testing.assert_allclose(our_t[seen], t[seen], rtol=1e-4)
+    np.testing.assert_allclose(our_n[seen], n[seen], atol=5e-3)
+
+
+def test_instances_and_names_and_what_is_not_used(tmp_path: Path):
+    loaded = load_xml(SCENES["foliage"](tmp_path))
+    assert loaded.scene.object_names == ("cloth", "ground", "left/rectangle", "left/rectangle 2",
+                                         "right/rectangle", "right/rectangle 2")
+    assert loaded.scene.max_depth == 16
+    assert (loaded.scene.width, loaded.scene.height) == (48, 32)
+    assert loaded.unused == ("the film 'hdrfilm' but for its size, the filter 'tent', the sampler "
+                             "'independent', the integrator 'path' but for its depth")
+    leaves = [s for s in loaded.scene.shapes if s.name.startswith(("left", "right"))]
+    assert len({id(shape.material) for shape in leaves}) == 1
+
+
+def test_parameters_are_taken_and_without_a_depth_paths_are_long(tmp_path: Path):
+    path = SCENES["glass"](tmp_path)
+    assert load_xml(path, {"depth": "5"}).scene.max_depth == 5
+    assert load_xml(path, {"depth": "-1"}).scene.max_depth == LONGEST_PATH
+
+
+def test_a_changed_mesh_or_picture_is_another_scene(tmp_path: Path):
+    path = SCENES["indoor"](tmp_path)
+    first = fingerprint(load_xml(path).scene, [0])
+    assert fingerprint(load_xml(path).scene, [0]) == first
+    write_png(tmp_path / "wood.png", np.full((8, 8, 3), 0.5))
+    second = fingerprint(load_xml(path).scene, [0])
+    mesh = tmp_path / "vase.obj"
+    mesh.write_text(mesh.read_text().replace("v 0.2", "v 0.21", 1))
+    assert len({first, second, fingerprint(load_xml(path).scene, [0])}) == 3
+
+
+def test_a_shape_of_a_file_may_be_given_a_motion(tmp_path: Path):
+    scene = load_xml(written(tmp_path, scene_xml(GROUND + BALL + SKY))).scene
+    moving = dataclasses.replace(scene, shapes=tuple(
+        dataclasses.replace(s, world_from_object=spin((0, 1, 0), 9) @ s.world_from_object)
+        if s.name == "ball" else s for s in scene.shapes))
+    assert moving.moving == ("ball",)
+    frame = Renderer(moving, 8, 12).frame(1)
+    assert not np.array_equal(frame.world_from_object[0], np.diag([0.5, 0.5, 0.5, 1]))
+
+
+SHAPE = '<shape type="{}">{}</shape>' + SKY
+
+
+@pytest.mark.parametrize(("text", "sentence"), [
+    ("<scene", r"line 1, column 6: it is no XML that can be read"),
+    ("", "it is no XML that can be read"),
+    ('<bsdf version="3.0.0" type="diffuse"/>', "the file holds a bsdf: give it a <scene>"),
+    (scene_xml('<include filename="a.xml"/>'), "files include each other without end"),
+    (scene_xml('<include filename="none.xml"/>'), 'included file "none.xml" not found'),
+    (scene_xml(SHAPE.format("sphere", '<float name="radius" value="$r"/>')),
+     r"line 8, column \d+: the parameter \$r has no value: give it one, as -D r=VALUE"),
+    (scene_xml(SHAPE.format("obj", '<string name="filename" value="no.obj"/>')),
+     r"line 8, column \d+: this obj names '.*no.obj', and there is no such file"),
+    (scene_xml(SHAPE.format("obj", "")), "this obj names no file"),
+    (scene_xml(SHAPE.format("obj", '<string name="filename" value="a.xml"/>')),
+     "this obj cannot be used: "),
+    (scene_xml(SHAPE.format("sphere", '<bsdf type="diffuse"><texture type="bitmap" name='
+                            '"reflectance"><string name="filename" value="no.png"/></texture>'
+                            "</bsdf>")), r"this bitmap names '.*no.png', and there is no such"),
+    (scene_xml(SHAPE.format("sphere", '<bsdf type="difuse"/>')),
+     "no material of Mitsuba's: did you mean 'diffuse'"),
+    (scene_xml(SHAPE.format("sphere", '<bsdf type="diffuse"><float name="gloss" value="1"/></bsdf>'
+                            )), r"line 8, column \d+: this diffuse has a property 'gloss'"),
+    (scene_xml(SHAPE.format("sphere", '<bsdf type="diffuse"><rgb name="reflectance" value="2"/>'
+                            "</bsdf>")), "'reflectance' of this diffuse holds 2: use 0 to 1"),
+    (scene_xml(SHAPE.format("sphere", '<bsdf type="hair"/>')), "a hair cannot be rendered here"),
+    (scene_xml(SHAPE.format("sphere", '<bsdf type="polarizer"/>')), "nothing of polarisation"),
+    (scene_xml(SHAPE.format("linearcurve", "")), "a shape of type 'linearcurve' cannot be"),
+    (scene_xml(SHAPE.format("sphere", '<medium name="interior" type="homogeneous"/>')),
+     "media cannot be rendered here, only surfaces"),
+    (scene_xml(SHAPE.format("sphere", '<float name="radus" value="1"/>')),
+     "a sphere has no property 'radus' here"),
+    (scene_xml(SHAPE.format("sphere", '<float name="radius" value="0"/>')), "use more than 0"),
+    (scene_xml(SHAPE.format("rectangle", '<transform name="to_world"><scale x="0"/></transform>')),
+     "flattened by its transform"),
+    (scene_xml(SHAPE.format("cylinder", '<transform name="to_world"><scale x="2"/></transform>')),
+     "stretched or sheared"),
+    (scene_xml(SKY), "there are no shapes"),
+    (scene_xml(BALL), "has no light"),
+    (scene_xml(BALL + SKY + SKY), "there is another environment"),
+    (scene_xml(BALL + '<emitter type="projector"/>'), "an emitter of type 'projector' cannot be"),
+    ('<scene version="3.0.0">' + BALL + SKY + "</scene>", "there is no camera: add a <sensor>"),
+    (scene_xml(BALL + SKY).replace('"perspective"', '"orthographic"'), "of type 'orthographic'"),
+    (scene_xml(BALL + SKY, '<float name="fov" value="500"/>'), "field of view is 500.0 degrees"),
+    (scene_xml(BALL + SKY, ""), "this sensor has no fov"),
+    (scene_xml(BALL + SKY, '<float name="fov" value="50"/><float name="principal_point_offset_x" '
+               'value="0.1"/>'), "principal point is off the centre"),
+])
+def test_what_cannot_be_rendered_is_told_in_one_sentence(text: str, sentence: str, tmp_path: Path):
+    path = written(tmp_path, text)
+    with pytest.raises(SceneError) as caught:
+        load_xml(path)
+    said = str(caught.value)
+    assert re.search(sentence, said), said
+    assert said.startswith("scene file '"), said
+    assert "\n" not in said
+    assert len(said) < 500
+
+
+def test_a_file_or_sensor_that_is_not_there(tmp_path: Path):
+    with pytest.raises(SceneError, match=r"there is no scene file '.*none.xml'"):
+        load_xml(tmp_path / "none.xml")
+    path = written(tmp_path, scene_xml(BALL + SKY))
+    with pytest.raises(SceneError, match="there is no sensor 1: use --sensor 0"):
+        load_xml(path, sensor=1)
+    with pytest.raises(SceneError, match=r"has no parameter \$spp: leave out -D spp"):
+        load_xml(path, {"spp": "4"})

@@ -1,0 +1,199 @@
+"""Mitsuba XML scenes of the plugin mix of those that people use most, written by code.
+
+Each function writes a file with its meshes and images into a folder and returns its path. Pictures
+are 48x32; what is tiny in them stands for what is large in the scenes that they are like.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from onespp.scenes import meshes
+from onespp.scenes.description import Mesh
+
+HEAD = """<scene version="3.0.0">
+  <default name="depth" value="{depth}"/><default name="filter" value="tent"/>
+  <integrator type="path"><integer name="max_depth" value="$depth"/></integrator>
+  <sensor type="perspective">
+    {fov}
+    <transform name="to_world">
+      <lookat origin="{origin}" target="{target}" up="0, 1, 0"/></transform>
+    <sampler type="independent"><integer name="sample_count" value="16"/></sampler>
+    <film type="hdrfilm"><integer name="width" value="48"/><integer name="height" value="32"/>
+      <rfilter type="$filter"/></film>
+  </sensor>
+"""
+
+
+def indoor(folder: Path) -> Path:
+    """A room of several OBJ and PLY meshes with bitmaps, bumps, and two area lights."""
+    write_obj(folder / "walls.obj", _room())
+    write_obj(folder / "table.obj", meshes.box((1.2, 0.1, 0.8)))
+    write_obj(folder / "vase.obj", meshes.lathe([(0.0, 0), (0.2, 0), (0.1, 0.3), (0.2, 0.5)], 12))
+    write_ply(folder / "block.ply", meshes.box((0.4, 0.4, 0.4)))
+    write_png(folder / "wood.png", _stripes((0.6, 0.4, 0.2), (0.3, 0.2, 0.1)))
+    write_png(folder / "bumps.png", _stripes((0.1, 0.1, 0.1), (0.9, 0.9, 0.9)))
+    path = folder / "indoor.xml"
+    path.write_text(HEAD.format(depth=7, origin="0, 1.2, 3.4", target="0, 0.9, 0",
+                                fov='<float name="fov" value="60"/>') + """
+  <bsdf type="twosided" id="wall"><bsdf type="diffuse">
+    <rgb name="reflectance" value="0.7, 0.65, 0.6"/></bsdf></bsdf>
+  <bsdf type="twosided" id="wood"><bsdf type="bumpmap">
+    <texture type="bitmap"><string name="filename" value="bumps.png"/>
+      <boolean name="raw" value="true"/></texture>
+    <float name="scale" value="0.02"/>
+    <bsdf type="roughplastic"><float name="alpha" value="0.2"/>
+      <texture name="diffuse_reflectance" type="bitmap">
+        <string name="filename" value="wood.png"/>
+        <transform name="to_uv"><scale x="2" y="2"/></transform></texture></bsdf></bsdf></bsdf>
+  <bsdf type="twosided" id="steel"><bsdf type="roughconductor">
+    <string name="material" value="Al"/><float name="alpha" value="0.25"/></bsdf></bsdf>
+  <shape type="obj" id="walls"><string name="filename" value="walls.obj"/><ref id="wall"/></shape>
+  <shape type="obj"><string name="filename" value="table.obj"/>
+    <transform name="to_world"><translate y="0.5"/></transform><ref id="wood"/></shape>
+  <shape type="obj"><string name="filename" value="vase.obj"/>
+    <transform name="to_world"><scale x="1" y="1.3" z="0.8"/>
+      <translate x="0.3" y="0.55"/></transform>
+    <ref id="steel"/></shape>
+  <shape type="ply"><string name="filename" value="block.ply"/>
+    <boolean name="face_normals" value="true"/>
+    <transform name="to_world"><scale x="-1"/><rotate y="1" angle="30"/>
+      <translate x="-0.4" y="0.75"/></transform>
+    <bsdf type="plastic"><rgb name="diffuse_reflectance" value="0.1, 0.3, 0.6"/></bsdf></shape>
+  <shape type="rectangle" id="lamp">
+    <transform name="to_world"><scale x="0.5" y="0.3"/><rotate x="1" angle="90"/>
+      <translate y="2.38"/></transform>
+    <emitter type="area"><rgb name="radiance" value="18, 16, 12"/></emitter></shape>
+  <shape type="sphere"><point name="center" x="-1.2" y="1.6" z="0.3"/>
+    <float name="radius" value="0.15"/>
+    <emitter type="area"><spectrum name="radiance" value="14"/></emitter></shape>
+</scene>
+""")
+    return path
+
+
+def glass(folder: Path) -> Path:
+    """Clear, thin and rough dielectrics and metal, boxes and tubes, a lamp with a picture."""
+    write_png(folder / "lamp.png", _stripes((0.2, 0.5, 0.9), (0.9, 0.6, 0.3)))
+    write_obj(folder / "block.obj", meshes.box((0.8, 0.8, 0.8)), normals=False)
+    path = folder / "glass.xml"
+    path.write_text(HEAD.format(depth=12, origin="0.5, 1.6, 4", target="0, 0.5, 0",
+                                fov='<string name="focal_length" value="45mm"/>') + """
+  <bsdf type="roughconductor" id="gold"><string name="material" value="Au"/>
+    <string name="distribution" value="ggx"/><float name="alpha" value="0.2"/></bsdf>
+  <shape type="rectangle"><transform name="to_world"><scale value="5"/>
+      <rotate x="1" angle="-90"/></transform>
+    <bsdf type="diffuse"><texture name="reflectance" type="checkerboard">
+      <rgb name="color0" value="0.2"/><rgb name="color1" value="0.7, 0.6, 0.5"/>
+      <transform name="to_uv"><scale x="6" y="6"/></transform></texture></bsdf></shape>
+  <shape type="sphere"><float name="radius" value="0.5"/>
+    <transform name="to_world"><translate x="-0.9" y="0.5" z="0.3"/></transform>
+    <bsdf type="roughdielectric"><float name="alpha" value="0.3"/>
+      <string name="int_ior" value="bk7"/></bsdf></shape>
+  <shape type="obj"><string name="filename" value="block.obj"/>
+    <boolean name="face_normals" value="true"/>
+    <transform name="to_world"><rotate y="1" angle="25"/><translate x="0.6" y="0.4"/></transform>
+    <bsdf type="roughdielectric"><float name="alpha" value="0.15"/></bsdf></shape>
+  <shape type="cylinder"><point name="p0" x="-0.2" y="0" z="-0.8"/>
+    <point name="p1" x="-0.2" y="1.4" z="-0.8"/><float name="radius" value="0.25"/>
+    <ref id="gold"/></shape>
+  <shape type="cube"><transform name="to_world"><scale x="0.02" y="0.5" z="0.4"/>
+      <translate x="-0.2" y="0.52" z="1"/></transform>
+    <bsdf type="thindielectric"/></shape>
+  <shape type="rectangle"><boolean name="flip_normals" value="true"/>
+    <transform name="to_world"><scale value="1.5"/><rotate x="1" angle="-90"/>
+      <translate y="3.5"/></transform>
+    <emitter type="area"><texture name="radiance" type="bitmap">
+      <string name="filename" value="lamp.png"/></texture></emitter></shape>
+  <emitter type="constant"><rgb name="radiance" value="0.4, 0.45, 0.5"/></emitter>
+</scene>
+""")
+    return path
+
+
+def foliage(folder: Path) -> Path:
+    """Masked quads of one group, instanced, under a turned environment map."""
+    alpha = np.zeros((8, 8, 3))
+    alpha[2:6, 1:7] = 1
+    write_png(folder / "leaf.png", alpha)
+    from onespp.render.mitsuba.variant import mi
+    sky = np.ones((4, 8, 3), np.float32) * (0.4, 0.6, 1.0)
+    sky[1, 2] = 6, 5, 4
+    mi.Bitmap(sky.astype(np.float32)).write(str(folder / "sky.exr"))
+    path = folder / "foliage.xml"
+    path.write_text(HEAD.format(depth=16, origin="0, 1, 4", target="0, 0.8, 0",
+                                fov='<float name="fov" value="35"/>'
+                                    '<string name="fov_axis" value="y"/>') + """
+  <bsdf type="mask" id="leaf">
+    <texture name="opacity" type="bitmap"><string name="filename" value="leaf.png"/>
+      <boolean name="raw" value="true"/></texture>
+    <bsdf type="twosided"><bsdf type="diffuse">
+      <rgb name="reflectance" value="0.2, 0.5, 0.1"/></bsdf></bsdf></bsdf>
+  <bsdf type="mask" id="veil"><float name="opacity" value="0.4"/>
+    <bsdf type="twosided"><bsdf type="principled"><rgb name="base_color" value="0.7, 0.2, 0.2"/>
+      <float name="roughness" value="0.5"/></bsdf></bsdf></bsdf>
+  <shape type="shapegroup" id="twig">
+    <shape type="rectangle"><transform name="to_world"><scale value="0.4"/>
+      <rotate x="1" angle="-35"/></transform><ref id="leaf"/></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="0.3"/>
+      <rotate y="1" angle="60"/><translate x="0.3" y="0.3"/></transform><ref id="leaf"/></shape>
+  </shape>
+  <shape type="instance" id="left"><ref id="twig"/>
+    <transform name="to_world"><translate x="-0.6" y="0.7"/></transform></shape>
+  <shape type="instance" id="right"><ref id="twig"/>
+    <transform name="to_world"><rotate y="1" angle="40"/><scale value="1.4"/>
+      <translate x="0.6" y="0.9" z="-0.5"/></transform></shape>
+  <shape type="disk" id="veil"><transform name="to_world"><scale x="0.5" y="0.8"/>
+      <translate y="0.9" z="0.8"/></transform><ref id="veil"/></shape>
+  <shape type="rectangle" id="ground"><transform name="to_world"><scale value="6"/>
+      <rotate x="1" angle="-90"/></transform>
+    <bsdf type="twosided"><bsdf type="diffuse"/></bsdf></shape>
+  <emitter type="envmap"><string name="filename" value="sky.exr"/>
+    <float name="scale" value="0.8"/>
+    <transform name="to_world"><rotate y="1" angle="70"/></transform></emitter>
+</scene>
+""".replace('id="veil"><transform', 'id="cloth"><transform'))
+    return path
+
+
+SCENES = {"indoor": indoor, "glass": glass, "foliage": foliage}
+
+
+def _room() -> Mesh:
+    """A box seen from inside, without its front."""
+    whole = meshes.box((4, 2.4, 4))
+    keep = ~(whole.vertices[whole.faces][:, :, 2] > 1.9).all(1)
+    assert whole.normals is not None
+    return Mesh(whole.vertices + np.array((0, 1.2, 0)), whole.faces[keep][:, ::-1], -whole.normals, whole.uv)
+
+
+def _stripes(a: tuple[float, ...], b: tuple[float, ...]) -> np.ndarray:
+    pixels = np.empty((8, 8, 3))
+    pixels[:, ::2], pixels[:, 1::2] = a, b
+    return pixels
+
+
+def write_png(path: Path, pixels: np.ndarray) -> None:
+    from onespp.render.mitsuba.variant import mi
+    mi.Bitmap(np.round(pixels * 255).astype(np.uint8)).write(str(path))
+
+
+def write_obj(path: Path, mesh: Mesh, normals: bool = True) -> None:
+    assert mesh.uv is not None
+    assert mesh.normals is not None
+    corner = "{0}/{0}/{0}" if normals else "{0}/{0}"
+    path.write_text("\n".join([
+        *(f"v {x} {y} {z}" for x, y, z in mesh.vertices), *(f"vt {u} {v}" for u, v in mesh.uv),
+        *(f"vn {x} {y} {z}" for x, y, z in mesh.normals if normals),
+        *("f " + " ".join(corner.format(i + 1) for i in face) for face in mesh.faces), ""]))
+
+
+def write_ply(path: Path, mesh: Mesh) -> None:
+    path.write_text("\n".join([
+        "ply", "format ascii 1.0", f"element vertex {len(mesh.vertices)}",
+        *(f"property float {axis}" for axis in "xyz"), f"element face {len(mesh.faces)}",
+        "property list uchar int vertex_indices", "end_header",
+        *(f"{x} {y} {z}" for x, y, z in mesh.vertices),
+        *(f"3 {a} {b} {c}" for a, b, c in mesh.faces), ""]))
