@@ -166,7 +166,8 @@ def _room() -> Mesh:
     whole = meshes.box((4, 2.4, 4))
     keep = ~(whole.vertices[whole.faces][:, :, 2] > 1.9).all(1)
     assert whole.normals is not None
-    return Mesh(whole.vertices + np.array((0, 1.2, 0)), whole.faces[keep][:, ::-1], -whole.normals, whole.uv)
+    return Mesh(whole.vertices + np.array((0, 1.2, 0)), whole.faces[keep][:, ::-1], -whole.normals,
+                whole.uv)
 
 
 def _stripes(a: tuple[float, ...], b: tuple[float, ...]) -> np.ndarray:
