@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from onespp.api.denoising import denoise, method, methods
-    from onespp.api.loading import load
+    from onespp.api.loading import animate, load
     from onespp.api.rendering import open, render, scenes
     from onespp.api.scoring import Report, compare, metrics, report, score
     from onespp.denoise.score.scorecard import Scores
@@ -35,12 +35,12 @@ if TYPE_CHECKING:
     from onespp.scenes.description import Scene, SceneError
 
 __all__ = ["Frame", "FrameSequence", "InputError", "Report", "Scene", "SceneError", "Scores",
-           "compare", "denoise", "load", "method", "methods", "metrics", "open", "render",
-           "report", "scenes", "score"]
+           "animate", "compare", "denoise", "load", "method", "methods", "metrics", "open",
+           "render", "report", "scenes", "score"]
 
 _PLACES = {
     "onespp.api.denoising": ("denoise", "method", "methods"),
-    "onespp.api.loading": ("load",),
+    "onespp.api.loading": ("animate", "load"),
     "onespp.api.rendering": ("open", "render", "scenes"),
     "onespp.api.scoring": ("Report", "compare", "metrics", "report", "score"),
     "onespp.denoise.score.scorecard": ("Scores",),

@@ -1,8 +1,9 @@
-"""A scene by name, from a file of Python or of Mitsuba's, to render or to change."""
+"""A scene by name, from a file of Python or of Mitsuba's, to render or to set in motion."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from onespp.render.errors import InputError
@@ -57,6 +58,39 @@ def load(scene: str | Path | Scene, *, define: Mapping[str, object] | None = Non
     if loaded.unused:
         caller().inform(f"of {Path(scene).name} is not used: {loaded.unused}")
     return loaded.scene
+
+
+@public
+def animate(scene: str | Path | Scene, *, camera: str | None = None,
+            moves: Mapping[str, str] | None = None, frames: int | None = None) -> Scene:
+    """A scene with its camera or some of its shapes set in motion.
+
+    Sizes follow from the scene: how far away what the camera sees is, how large a shape is. The
+    camera's path passes through no surface; where there is less room, the move is smaller.
+
+    Args:
+        scene: as for `load`.
+        camera: "orbit", "dolly", "handheld", or "still"; None leaves it as it is.
+        moves: names of shapes and, for each, "spin", "swing" or "slide".
+        frames: how many the scene has then.
+
+    Raises:
+        SceneError: no such scene, move or shape, or the camera has no room.
+
+    Example:
+        >>> import onespp
+        >>> onespp.animate("hard/mirror", camera="orbit").moving[0]
+        'camera'
+    """
+    made = load(scene)
+    if moves or camera:
+        with turn():
+            from onespp.render.scene_files.camera_moves import with_camera_move  # imports Mitsuba
+            from onespp.render.scene_files.shape_moves import with_shape_moves
+
+            made = with_camera_move(made, camera) if camera else made
+            made = with_shape_moves(made, moves or {})
+    return made if frames is None else replace(made, frames=frames)
 
 
 def _text(value: object) -> str:

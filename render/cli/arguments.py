@@ -24,15 +24,19 @@ def parse_size(text: str) -> tuple[int, int]:
     return height, width
 
 
-def parse_settings(texts: Iterable[str], option: str = "-D") -> dict[str, str]:
+def parse_settings(texts: Iterable[str], option: str = "-D",
+                   last: bool = False) -> dict[str, str]:
     """Values by name, of texts NAME=VALUE.
+
+    Args:
+        last: a name may hold "=", a value may not.
 
     Raises:
         InputError: one has another form.
     """
     made = {}
     for text in texts:
-        name, equals, value = text.partition("=")
+        name, equals, value = text.rpartition("=") if last else text.partition("=")
         if not (name and equals):
             raise InputError(f"{option} {text} is not understood: use {option} NAME=VALUE")
         made[name] = value

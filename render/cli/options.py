@@ -36,6 +36,12 @@ scene_options = (
                       "times."),
     click.option("--sensor", type=int, default=0, show_default=True, metavar="N",
                  help="Which camera of a Mitsuba XML file, from 0."),
+    click.option("--camera", metavar="MOVE",
+                 help="Set a still camera in motion, as far as there is room: orbit, dolly or "
+                      "handheld; or make it still."),
+    click.option("--move", "moves", multiple=True, metavar="NAME=MOVE",
+                 help="Set the shape NAME in motion: spin, swing or slide; may be given several "
+                      "times."),
 )
 
 

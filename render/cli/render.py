@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from onespp.api import rendering as api
-from onespp.api.loading import load
+from onespp.api.loading import animate, load
 from onespp.render.files.frame_ranges import parse_frames
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import FrameSequence
@@ -33,9 +33,11 @@ def render(scene: str, out: Path | None, device: str, threads: int | None, **opt
 
 
 def render_to(name: str, out: Path | None, *, frames: str | None = None, size: str | None = None,
-              define: tuple[str, ...] = (), sensor: int = 0, **options) -> FrameSequence:
+              define: tuple[str, ...] = (), sensor: int = 0, camera: str | None = None,
+              moves: tuple[str, ...] = (), **options) -> FrameSequence:
     """Do what the options of a command ask."""
-    scene = load(name, define=parse_settings(define), sensor=sensor)
+    scene = animate(load(name, define=parse_settings(define), sensor=sensor), camera=camera,
+                    moves=parse_settings(moves, "--move", last=True))
     return api.render(scene, out or Path("data") / scene.name,
                       frames=None if frames is None else parse_frames(frames),
                       size=None if size is None else parse_size(size), **options)
