@@ -36,12 +36,10 @@ _PERIODS = np.array([37.0, 29, 23, 31, 19, 27])  # frames, of six axes: they mee
 _PHASES = np.array([0.0, 2, 4, 1, 3, 5])
 
 
-
 class Move(Protocol):
     """Where the camera is in a frame, at a size from 0 to 1."""
 
     def __call__(self, frame: float, size: float) -> Matrix: ...
-
 
 
 def with_camera_move(scene: Scene, kind: str) -> Scene:
