@@ -281,7 +281,7 @@ def test_environment_image_of_any_size_and_file(size, tmp_path):
 @pytest.mark.parametrize(("environment", "words"), [
     ("no.exr", ["'no.exr'"]), (__file__, ["no image"]), (np.ones((4, 4)), ["(h, w, 3)"]),
     (np.ones((0, 4, 3)), ["pixels"]), (-np.ones((4, 8, 3)), ["-1"]), (lambda frame: 1, ["number"]),
-    (np.full((4, 8, 3), np.nan), ["not finite"]), ({"type": "sunsky"}, ["sunsky"]), (-1, ["-1"])])
+    (np.full((4, 8, 3), np.nan), ["not finite"]), ({"type": "point"}, ["point"]), (-1, ["-1"])])
 def test_environment_that_cannot_be_is_refused(environment, words):
     refused(lambda: MitsubaScene(scene(environment=environment)),
             "environment of scene 't'", *words)
