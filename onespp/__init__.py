@@ -24,25 +24,29 @@ if TYPE_CHECKING:
     import inspect
     from typing import Any
 
+    from onespp.api.datasets import dataset
     from onespp.api.denoising import denoise, method, methods
     from onespp.api.loading import animate, load
     from onespp.api.rendering import open, render, scenes
     from onespp.api.scoring import Report, compare, metrics, report, score
+    from onespp.datasets.folder import DataSet
     from onespp.denoise.score.scorecard import Scores
     from onespp.render.errors import InputError
     from onespp.render.files.sequence import FrameSequence
     from onespp.render.frame import Frame
     from onespp.scenes.description import Scene, SceneError
 
-__all__ = ["Frame", "FrameSequence", "InputError", "Report", "Scene", "SceneError", "Scores",
-           "animate", "compare", "denoise", "load", "method", "methods", "metrics", "open",
+__all__ = ["DataSet", "Frame", "FrameSequence", "InputError", "Report", "Scene", "SceneError",
+           "Scores", "animate", "compare", "dataset", "denoise", "load", "method", "methods", "metrics", "open",
            "render", "report", "scenes", "score"]
 
 _PLACES = {
+    "onespp.api.datasets": ("dataset",),
     "onespp.api.denoising": ("denoise", "method", "methods"),
     "onespp.api.loading": ("animate", "load"),
     "onespp.api.rendering": ("open", "render", "scenes"),
     "onespp.api.scoring": ("Report", "compare", "metrics", "report", "score"),
+    "onespp.datasets.folder": ("DataSet",),
     "onespp.denoise.score.scorecard": ("Scores",),
     "onespp.render.errors": ("InputError",),
     "onespp.render.files.sequence": ("FrameSequence",),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -47,7 +47,7 @@ class RenderJob:
             and are always Sobol.)
         jitter: "halton" moves all rays of a frame by an offset of its own within the pixel, see
             `tracer/camera_rays.py`; "none" sends them through centres.
-        command: the command line, for the manifest.
+        command: the command line, for the manifest. dated: whether that says when it was made.
     """
 
     scene: Scene
@@ -66,12 +66,19 @@ class RenderJob:
     half: bool = False
     reference_error: float | None = None
     jitter: str = "none"
+    dated: bool = True
 
     @cached_property
     @turn()
     def renderer(self) -> Renderer:
         return Renderer(self.scene, self.height, self.width, direct=self.direct,
                         sampler=self.sampler, jitter=self.jitter)
+
+    def with_other_noise(self, seed: int) -> RenderJob:
+        """The same frames of another seed, without references, by the same renderer."""
+        other = replace(self, seed=seed, reference_spp=None, reference_error=None)
+        other.__dict__["renderer"] = self.renderer  # compiled already
+        return other
 
     @property
     def fewest_spp(self) -> int | None:
@@ -110,7 +117,8 @@ class RenderJob:
             device=backend.choose(), machine=machine(backend.choose()),
             versions=versions("mitsuba", "drjit", "numpy"),
             commands=(self.command,) if self.command else (),
-            created=datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"))
+            created=datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
+            if self.dated else "")
 
 
 def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,

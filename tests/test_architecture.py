@@ -22,6 +22,8 @@ ROOT = Path(__file__).parents[1]
 ROOMS = (
     "onespp.__main__", "onespp.cli", "onespp.templates", "onespp.denoise.cli", "onespp.render.cli",
     "onespp", "onespp.api",
+    "onespp.datasets.pool", "onespp.datasets.preview", "onespp.datasets.making",
+    "onespp.datasets.look", "onespp.datasets",
     "onespp.denoise.report", "onespp.denoise.bench", "onespp.denoise.studies",
     "onespp.denoise.run", "onespp.denoise.score",
     "onespp.denoise.catalog", "onespp.denoise.peers",
@@ -40,7 +42,8 @@ ROOMS = (
     "onespp.render.channels",
     "onespp.render.progress",
     "onespp.render.errors",
-    "onespp.scenes.catalog", "onespp.scenes.generated", "onespp.scenes.hard", "onespp.scenes.room",
+    "onespp.scenes.catalog", "onespp.scenes.drawn", "onespp.scenes.generated",
+    "onespp.scenes.hard", "onespp.scenes.room",
     "onespp.scenes",
     "onespp.show",
     "onespp.entry_points", "onespp.user_code",
@@ -62,6 +65,9 @@ NEVER = {  # module -> what it never imports
     # a command parses, calls and prints: images and kernels are below it
     r"^onespp\.(\w+\.)?cli(\.|$)": r"^(numpy|drjit|mitsuba|"
                                      r"onespp\.render\.(tracer|scene_files|mitsuba))(\.|$)",
+    # data loaders' workers
+    r"^onespp\.(clips|datasets\.(folder|plan|card))(\.|$)":
+        r"^(drjit|mitsuba|onespp\.render\.(tracer|scene_files|mitsuba|job))(\.|$)",
     r"^onespp\.scenes(\.|$)": r"^(onespp\.(render|denoise)|drjit|mitsuba)(\.|$)",
 }
 
@@ -166,7 +172,8 @@ def test_a_broken_rule_is_noticed(module: str, line: str, complaint: str):
 
 
 def test_a_folder_holds_3_to_12_files():
-    folders = {path.parent for top in ("scenes", "render", "denoise", "onespp/api", "onespp/show")
+    folders = {path.parent for top in ("scenes", "render", "denoise", "onespp/api", "onespp/show",
+                                             "onespp/datasets")
                for path in (ROOT / top).rglob("*.py")}
     sizes = {str(folder.relative_to(ROOT)): len([
         p for p in folder.iterdir() if p.suffix == ".py" and p.stem != "__init__"])
@@ -188,7 +195,7 @@ def test_every_folder_is_a_package_that_is_installed():
 
 @pytest.mark.parametrize("module", [
     "onespp", "onespp.render", "onespp.render.files", "onespp.denoise", "onespp.denoise.metrics",
-    "onespp.denoise.score", "onespp.scenes"])
+    "onespp.denoise.score", "onespp.scenes", "onespp.datasets.folder"])
 def test_what_is_light_loads_no_kernels(module: str):
     code = (f"import sys, pkgutil, importlib; m = importlib.import_module('{module}')\n"
             "heavy = {'drjit', 'mitsuba', 'click', 'matplotlib', 'PIL'} & set(sys.modules)\n"

@@ -76,7 +76,7 @@ def render(scene: str | Path | Scene, out: Path | str | None = None, *,
         ([0, 1], (12, 16, 3))
     """
     made = load(scene)
-    height, width = (made.height, made.width) if size is None else _size(size)
+    height, width = (made.height, made.width) if size is None else checked_size(size)
     numbers = _numbers(frames, made)
     if seed < 0:
         raise InputError(f"--seed is {seed}: use 0 or more")
@@ -131,7 +131,8 @@ def scenes() -> dict[str, str]:
     return {name: catalog.load(name).about for name in catalog.names()}
 
 
-def _size(size: tuple[int, int]) -> tuple[int, int]:
+def checked_size(size: tuple[int, int]) -> tuple[int, int]:
+    """(height, width) as plain ints; InputError where they are none."""
     try:
         height, width = size
     except (TypeError, ValueError):

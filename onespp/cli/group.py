@@ -18,6 +18,7 @@ from onespp.render.cli.render import export, import_, render
 from onespp.render.cli.terminal import run as run_command
 
 from .completion import completion
+from .dataset import dataset
 from .doctor import doctor
 from .hard import hard
 from .lead import lead
@@ -39,7 +40,7 @@ def app() -> None:
 
 
 for command in (scenes, render, denoise, time_, score, run, report, view, compare, bench, tune,
-                ablate, lead, truth, hard, import_, export, new, doctor,
+                ablate, lead, truth, hard, dataset, import_, export, new, doctor,
                 completion):
     command.epilog = EXIT_CODES.get(command.name or "", EXIT_CODES[""])
     app.add_command(command)

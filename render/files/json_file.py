@@ -30,7 +30,7 @@ def read_json(path: Path, model: type[_Model]) -> _Model:
     try:
         return model.model_validate_json(data)
     except ValidationError as error:
-        raise InputError(f"{path} {_explain(error)}") from None
+        raise InputError(f"{path} {explain(error)}") from None
 
 
 def checked(model: type[_Model], what: str, **values: Any) -> _Model:
@@ -38,14 +38,14 @@ def checked(model: type[_Model], what: str, **values: Any) -> _Model:
     try:
         return model(**values)
     except ValidationError as error:
-        raise InputError(f"{what} {_explain(error)}") from None
+        raise InputError(f"{what} {explain(error)}") from None
 
 
 def format_json(model: JsonFile) -> str:
     return model.model_dump_json(indent=2) + "\n"
 
 
-def _explain(error: ValidationError) -> str:
+def explain(error: ValidationError) -> str:
     """The first of pydantic's complaints, as the end of a sentence that begins with the file."""
     first = error.errors(include_url=False, include_input=False)[0]
     if first["type"] == "json_invalid":

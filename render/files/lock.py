@@ -5,8 +5,9 @@ that dies, however it dies, leaves none: a file that is left over is taken by th
 whatever process or host it names. Its text says who writes, for the message to a second writer.
 
 Parts are what commands write: `render` (frames and references; an import too), `denoise-METHOD`,
-`time`, `score`, `report`. Different parts may be written at once. Where the system or the file
-system knows no locks (Windows; some network drives) writers are not told of each other.
+`time`, `score`, `report`; of a data set `dataset`, and `sequence` in the folder of each of its
+scenes. Different parts may be written at once. Where the system or the file system knows no locks
+(Windows; some network drives) writers are not told of each other.
 """
 
 from __future__ import annotations
@@ -31,10 +32,15 @@ try:
 except ImportError:
     fcntl = None
 
+class Busy(InputError):
+    """Another process writes it."""
+
+
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 _RESULTS = "denoise-"
 _PLACES = {"render": ("frames/*", "reference/*", "*.manifest.json"), "time": ("*.times.json",),
-           "score": ("pictures/*", "*.scores.*"), "report": ("report/**/*",)}
+           "score": ("pictures/*", "*.scores.*"), "report": ("report/**/*",),
+           "dataset": ("*.dataset.json", "*.README.md"), "sequence": ("*.sequence.json",)}
 
 
 @contextmanager
@@ -103,7 +109,7 @@ def _open(path: Path) -> int:
         except BlockingIOError:
             who = os.read(descriptor, 300).decode(errors="replace")
             os.close(descriptor)
-            raise InputError(_busy(path, who)) from None
+            raise Busy(_busy(path, who)) from None
         except OSError as error:
             if error.errno in _NO_LOCKS:
                 return descriptor

@@ -26,9 +26,9 @@ _ROOM_AREA = 250.0  # m^2
 _LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
 
 
-def exposed(rig: Rig, stage: Stage, frames: int) -> Rig:
-    """The rig with its light scaled."""
-    factor = _factor(_radiance(rig, stage, frames))
+def exposed(rig: Rig, stage: Stage, frames: int, stops: float = 0.0) -> Rig:
+    """The rig with its light scaled; stops: by so many factors of 2 more."""
+    factor = _factor(_radiance(rig, stage, frames)) * 2**stops
     sky = rig.sky
     if isinstance(sky, tuple):
         r, g, b = (factor * np.asarray(sky)).tolist()

@@ -16,7 +16,7 @@ from onespp.scenes.transforms import Matrix, rotate, scale, translate
 from .objects import Free
 from .plan import Plan
 from .skies import evening, overcast, sun
-from .stages import BACK, HEIGHT, Stage
+from .stages import Stage
 
 CHANGES = ("moves", "color", "switched", "dimmed", "steady")
 _WARM, _COLD = np.array((1.0, 0.8, 0.55)), np.array((0.75, 0.88, 1.0))
@@ -70,14 +70,14 @@ def rig(draft: Plan, stage: Stage, free: Free) -> Rig:
     outdoors = draft.place != "indoors"
     match draft.light:
         case "panels":
-            lamps = [_panel(random, i, power) for i, power in enumerate(
+            lamps = [_panel(random, stage, i, power) for i, power in enumerate(
                 random.uniform(0.4, 1, int(random.integers(1, 4))))]
             return Rig(tuple(lamps))
         case "unequal":
             count = int(random.integers(9, 15))
             powers, sizes = 10 ** random.uniform(-1.7, 0, count), 10 ** random.uniform(
                 -1.5, -0.5, count)
-            return Rig(tuple(_hung(random, i, float(p), float(s))
+            return Rig(tuple(_hung(random, stage, i, float(p), float(s))
                              for i, (p, s) in enumerate(zip(powers, sizes))),
                        overcast(random, 0.02) if outdoors else None)
         case "close":
@@ -85,21 +85,25 @@ def rig(draft: Plan, stage: Stage, free: Free) -> Rig:
             lamps += _sconces(random, stage, int(random.integers(1, 4)))
             if outdoors:
                 return Rig(tuple(lamps), overcast(random, 0.015))
-            return Rig((*lamps, _panel(random, 0, 0.25)))
+            return Rig((*lamps, _panel(random, stage, 0, 0.25)))
         case "sun":
             few = int(random.integers(0, 2)) if draft.place == "open ground" else 2
-            return Rig(tuple(_hung(random, i, 1.0, 0.15) for i in range(few)), sun(random, 0.25))
+            return Rig(tuple(_hung(random, stage, i, 1.0, 0.15) for i in range(few)),
+                       sun(random, 0.25))
         case "overcast":
-            return Rig((_hung(random, 0, 0.6, 0.28),), overcast(random, 0.3))
+            return Rig((_hung(random, stage, 0, 0.6, 0.28),), overcast(random, 0.3))
         case "night":
             count = int(random.integers(3, 6))
-            return Rig((*(_hung(random, i, random.uniform(0.3, 1), random.uniform(0.04, 0.2))
-                          for i in range(count)), *_globes(random, free, 1, 0.3)),
+            return Rig((*(_hung(random, stage, i, random.uniform(0.3, 1),
+                                random.uniform(0.04, 0.2)) for i in range(count)),
+                        *_globes(random, free, 1, 0.3)),
                        overcast(random, 0.006))
     count = int(random.integers(3, 6))
-    lamps = [_changed(random, _hung(random, i, random.uniform(0.5, 1), random.uniform(0.08, 0.35)),
-                      CHANGES[(i + draft.number) % len(CHANGES)]) for i in range(count)]
-    lamps.append(_hung(random, count, 0.5, 0.3))  # something stays on
+    lamps = [_changed(random, _hung(random, stage, i, random.uniform(0.5, 1),
+                                    random.uniform(0.08, 0.35)),
+                      CHANGES[(i + draft.number) % len(CHANGES)], draft.frames)
+             for i in range(count)]
+    lamps.append(_hung(random, stage, count, 0.5, 0.3))  # something stays on
     return Rig(tuple(lamps), evening(random, 0.03) if outdoors else None,
                tuple(CHANGES[(i + draft.number) % len(CHANGES)] for i in range(count)))
 
@@ -109,20 +113,21 @@ def _tint(random: np.random.Generator) -> Color:
     return r, g, b
 
 
-def _panel(random: np.random.Generator, i: int, power: float) -> Lamp:
+def _panel(random: np.random.Generator, stage: Stage, i: int, power: float) -> Lamp:
     """A rectangle under the ceiling that shines down."""
     half = random.uniform(0.25, 0.9), random.uniform(0.2, 0.6)
     x = (-1.9, 0.3, 2.2)[i % 3] + random.uniform(-0.2, 0.2)
-    place = (translate((x, HEIGHT - 0.02, random.uniform(-1.2, 1.8))) @ rotate((1, 0, 0), 90)
+    place = (translate((x, stage.height - 0.02, random.uniform(-1.2, 1.8))) @ rotate((1, 0, 0), 90)
              @ scale((*half, 1)))
     return Lamp(f"panel_{i}", Rectangle(), place, 4 * half[0] * half[1], power, _tint(random))
 
 
-def _hung(random: np.random.Generator, i: int, power: float, size: float) -> Lamp:
+def _hung(random: np.random.Generator, stage: Stage, i: int, power: float, size: float) -> Lamp:
     """A lamp of radius `size` overhead: a globe, or a disk or square that faces the origin."""
     angle = random.uniform(0, 2 * math.pi)
-    away, high = random.uniform(0.6, 2.6), random.uniform(2.1, HEIGHT - 0.3)
-    position = np.array((away * math.cos(angle), high, max(away * math.sin(angle), BACK + 0.8)))
+    away, high = random.uniform(0.6, 2.6), random.uniform(2.1, stage.height - 0.3)
+    position = np.array((away * math.cos(angle), high, max(away * math.sin(angle),
+                                                               stage.back + 0.8)))
     size = min(size, 0.28)
     color = _tint(random)
     match random.integers(3):
@@ -174,10 +179,11 @@ def _sconces(random: np.random.Generator, stage: Stage, count: int) -> list[Lamp
     return lamps
 
 
-def _changed(random: np.random.Generator, lamp: Lamp, change: str) -> Lamp:
-    """The lamp with one of `CHANGES`."""
+def _changed(random: np.random.Generator, lamp: Lamp, change: str, frames: int) -> Lamp:
+    """The lamp with one of `CHANGES`; it is switched in the middle half of the frames."""
     color, period = np.asarray(lamp.curve), random.uniform(12, 30)
-    phase, event = random.uniform(0, 2 * math.pi), int(random.integers(5, 15))
+    phase, event = random.uniform(0, 2 * math.pi), int(
+        random.integers(max(1, frames // 4), max(2, 3 * frames // 4)))
     curve, place = lamp.curve, lamp.place
     def wheel(frame: float) -> np.ndarray:
         turned = 2 * math.pi * (frame / period + np.arange(3) / 3) + phase

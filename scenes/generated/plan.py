@@ -35,7 +35,11 @@ _PALETTES = tuple(tuple(rgb(f"#{code}") for code in row.split()) for row in (
 
 @dataclass(frozen=True)
 class Plan:
-    """place, light, camera: of `PLACES`, `LIGHTS` and `CAMERAS`; ground, wall, colors: albedos."""
+    """place, light, camera: of `PLACES`, `LIGHTS` and `CAMERAS`; ground, wall, colors: albedos.
+
+    key: what random numbers are drawn by, default the seed of these scenes and the number.
+    frames: within which lights are switched.
+    """
 
     number: int
     place: str
@@ -44,10 +48,12 @@ class Plan:
     ground: Color
     wall: Color
     colors: tuple[Color, ...]
+    key: tuple[int, ...] = ()
+    frames: int = 20
 
     def random(self, what: str) -> np.random.Generator:
         """Random numbers for one part of the scene: a change of one part leaves the others."""
-        return np.random.default_rng((SEED, self.number, *what.encode()))
+        return np.random.default_rng((*(self.key or (SEED, self.number)), *what.encode()))
 
     @property
     def lamps_are_found(self) -> bool:

@@ -24,12 +24,15 @@ class Stage:
 
     walls: (n, 2, 3) points on walls and the way they face, which lamps and exposure need.
     sky: the share of the sky that is seen from the ground.
+    back, height: of the back wall and the ceiling, where they are or would be, metres.
     """
 
     shapes: tuple[Shape, ...]
     closed: float
     sky: float
     walls: np.ndarray
+    back: float = BACK
+    height: float = HEIGHT
 
 
 def stage(draft: Plan) -> Stage:
@@ -39,7 +42,7 @@ def stage(draft: Plan) -> Stage:
     floor = Shape("floor", Rectangle(), surfaces.ground(random, draft.ground, half,
                                                         draft.lamps_are_found),
                   rotate(X, -90) @ scale((half, half, 1)))
-    return {"indoors": _room, "open ground": _ground, "half open": _court}[draft.place](
+    return {"indoors": _room, "open ground": _ground, "half open": court}[draft.place](
         draft, random, floor)
 
 
@@ -103,12 +106,15 @@ def _ground(draft: Plan, random: np.random.Generator, floor: Shape) -> Stage:
     return Stage(tuple(shapes), 0.0, 1.0, np.empty((0, 2, 3)))
 
 
-def _court(draft: Plan, random: np.random.Generator, floor: Shape) -> Stage:
+def court(draft: Plan, random: np.random.Generator, floor: Shape,
+          kind: str | None = None) -> Stage:
+    """Walls or a roof on columns under the sky; kind: corner, hall or columns, None: drawn."""
     shapes, points, sky = [floor], [], 0.8
     stone = surfaces.wall(random, draft.wall)
     column = lathe([(0, 0), (0.24, 0), (0.24, 0), (0.24, 0.15), (0.24, 0.15), (0.17, 0.18),
                     (0.14, HEIGHT)], 32)
-    kind = ("corner", "hall", "columns")[random.integers(3)]
+    drawn = ("corner", "hall", "columns")[random.integers(3)]
+    kind = kind or drawn
     if kind != "columns":
         shapes.append(_wall("wall_back", draft, random, _back()))
         points += _BACK_POINTS

@@ -34,11 +34,11 @@ def camera(draft: Plan) -> Camera:
         return Camera(dolly(place, {0: -0.1, 20: random.uniform(0.5, 0.8)}, direction, "linear"),
                       fov)
     if draft.camera == "handheld":
-        return Camera(_shaken(random, place[:3, 3], np.asarray(target)), fov)
+        return Camera(shaken(random, place[:3, 3], np.asarray(target)), fov)
     return Camera(place, fov)
 
 
-def _shaken(random: np.random.Generator, origin: np.ndarray, target: np.ndarray) -> Animation:
+def shaken(random: np.random.Generator, origin: np.ndarray, target: np.ndarray) -> Animation:
     """Breath and tremor: sums of sines of 7 to 40 frames, in place, aim and roll."""
     periods, phases = random.uniform(7, 40, (7, 3)), random.uniform(0, 2 * math.pi, (7, 3))
 

@@ -1,0 +1,111 @@
+"""What a drawn scene may be made of: names of kinds, and ranges of numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+from onespp.scenes.description import SceneError
+
+Family = Literal["room", "window", "ground", "corner", "hall", "columns"]
+Object = Literal["crate", "ball", "vase", "ring", "block", "goblet", "sheet", "stack", "egg",
+                 "hoop", "drum", "cone", "bowl", "pawn"]
+Material = Literal["plain", "checks", "varnish", "wood", "metal", "weave", "grain", "polished",
+                   "varnished wood", "mirror", "glass"]
+Light = Literal["panels", "unequal", "close", "changing", "sun", "overcast", "night"]
+Motion = Literal["still", "spin", "slide", "stop and go", "bounce", "spline"]
+CameraMove = Literal["still", "orbit", "dolly", "handheld", "cut"]
+
+LIGHTS_OF: dict[str, tuple[str, ...]] = {
+    "room": ("panels", "unequal", "close", "changing"),
+    "window": ("sun", "panels", "overcast", "changing"),
+    "ground": ("sun", "overcast", "night", "changing"),
+    **dict.fromkeys(("corner", "hall", "columns"),
+                    ("sun", "unequal", "close", "overcast", "changing")),
+}
+"""Family -> the lights that suit it: panels hang under ceilings, suns shine from a sky."""
+CLOSED = ("ball", "egg", "ring", "hoop", "vase")
+"""Objects that may be of glass."""
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What to draw from.
+
+    Attributes:
+        families: of places. objects, materials, lights, motions, cameras: names of kinds; a name
+            that is there twice is drawn twice as often.
+        things: fewest and most of them. speed: of things and cameras, 1: as `generated/` scenes.
+        exposure: stops, 0: neither dark nor blown (`generated/exposure.py`).
+        sharp: mirrors and glass among small lamps too, whose light in them references find late.
+
+    Raises:
+        SceneError: a list without names, a range that is empty or out of bounds, a family that
+            none of the lights suits, or nothing but glass and mirrors to make things of.
+    """
+
+    families: tuple[Family, ...] = get_args(Family)
+    objects: tuple[Object, ...] = get_args(Object)
+    materials: tuple[Material, ...] = get_args(Material)
+    lights: tuple[Light, ...] = get_args(Light)
+    motions: tuple[Motion, ...] = get_args(Motion)
+    cameras: tuple[CameraMove, ...] = get_args(CameraMove)
+    things: tuple[int, int] = (8, 12)
+    speed: tuple[float, float] = (0.5, 1.5)
+    exposure: tuple[float, float] = (-0.7, 0.5)
+    sharp: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("families", "objects", "materials", "lights", "motions", "cameras"):
+            if not getattr(self, name):
+                raise SceneError(f"{name} is an empty list: name one or more, or leave it out")
+        for name, least, most in (("things", 1, 30), ("speed", 0, 10), ("exposure", -8, 8)):
+            low, high = getattr(self, name)
+            if not least <= low <= high <= most:
+                raise SceneError(f"{name} is [{low}, {high}]: use two numbers from {least} to "
+                                 f"{most}, the smaller one first")
+        for family in self.families:
+            if not self.lights_of(family):
+                raise SceneError(f"none of the lights suits the family '{family}': add one of "
+                                 f"{', '.join(LIGHTS_OF[family])}")
+        require_plain_material(self.materials, "materials")
+
+    def lights_of(self, family: str) -> tuple[str, ...]:
+        """The chosen lights that suit a family."""
+        return tuple(light for light in self.lights if light in LIGHTS_OF[family])
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What stands in scenes of the test split alone.
+
+    Attributes:
+        families: of which the test split's places are, if there are any. objects, materials: each
+            thing of the test split is of one of these objects, or of one of these materials.
+    """
+
+    families: tuple[Family, ...] = ()
+    objects: tuple[Object, ...] = ()
+    materials: tuple[Material, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.materials:
+            require_plain_material(self.materials, "materials")
+
+    def left(self, choices: Choices) -> Choices:
+        """The choices without these.
+
+        Raises:
+            SceneError: nothing is left.
+        """
+        return replace(choices, **{name: tuple(kind for kind in getattr(choices, name)
+                                               if kind not in getattr(self, name))
+                                   for name in ("families", "objects", "materials")})
+
+
+def require_plain_material(materials: Sequence[str], name: str) -> None:
+    """SceneError where there are only materials that not everything may be of."""
+    if set(materials) <= {"glass", "mirror"}:
+        raise SceneError(f"{name} has only {' and '.join(sorted(set(materials)))}, which not "
+                         "everything may be of: add another one")
