@@ -1,0 +1,209 @@
+"""Data sets made, stopped and gone on with, shared between processes, damaged, and looked at."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import onespp
+from onespp.datasets import look, making
+from onespp.datasets.folder import DataSet, DataSetFile, Made
+from onespp.datasets.plan import Plan, changed_plan, read_plan
+from onespp.render.errors import InputError
+from onespp.render.files.json_file import read_json
+from onespp.render.files.lock import writing
+from onespp.scenes.description import Camera
+from onespp.scenes.drawn.draw import Drawn, draw
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {path.relative_to(folder).as_posix(): path.read_bytes()
+            for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+@pytest.fixture
+def plan() -> Plan:
+    return read_plan("simple", {"sequences": 3, "frames": 2, "height": 16, "width": 24})
+
+
+@pytest.fixture
+def quick(monkeypatch, plan, tmp_path):
+    """An empty data set whose sequences are made of nothing, at once; and those made, in order."""
+    data, order = DataSet.create(tmp_path / "quick", plan, {}), []
+
+    def make(data: DataSet, number: int, progress=None) -> Made:
+        with writing(data.place(number), "sequence"):
+            order.append(number)
+            return data.finish_sequence(number, "f", draw(plan.request(number)).record, [])
+
+    monkeypatch.setattr(making, "make", make)
+    return data, order
+
+
+def test_a_data_set_is_whole_and_says_what_was_drawn(made):
+    assert made.numbers() == [0, 1]
+    assert made.numbers("validation") == [1]
+    assert made.verify() == []
+    assert made.status().left == 0
+    found = made.made(1)
+    assert found.draw["camera"] == "orbit"
+    assert found.fingerprint == made.sequence(1).manifest.fingerprint
+    listed = read_json(made.folder / "dataset.json", DataSetFile).sequences
+    assert {n: e.digest for n, e in listed.items()} == {n: made.made(n).digest for n in (0, 1)}
+    card = (made.folder / "README.md").read_text()
+    assert "| validation | 1 | 3 |" in card
+    assert found.digest[:16] in card
+
+
+def test_renders_of_a_frame_share_its_reference_but_no_noise(made):
+    one, two = made.sequence(0, 0), made.sequence(0, 1)
+    assert one.has_reference(2)
+    assert not two.has_reference(2)
+    a, b = one.read_frame(1), two.read_frame(1)
+    assert np.array_equal(a["depth"], b["depth"])
+    assert not np.array_equal(a["color"], b["color"])
+
+
+def test_what_is_missing_is_made_again_to_the_same_bytes(made, copy):
+    whole = files(copy.folder)
+    (copy.place(0) / "sequence.json").unlink()
+    (copy.place(0) / "seed1/frames/0001.exr").unlink()
+    (copy.place(0) / "seed0/reference/0002.exr").unlink()
+    onespp.dataset(copy.plan, copy.folder)
+    assert files(copy.folder) == whole
+
+
+def test_a_byte_that_changed_and_a_sequence_that_is_gone_are_found(copy, call):
+    path = copy.place(0) / "seed0/frames/0001.exr"
+    data = bytearray(path.read_bytes())
+    data[-20] ^= 1
+    path.write_bytes(data)
+    (copy.place(1) / "sequence.json").unlink()
+    wrong = copy.verify()
+    assert len(wrong) == 2
+    assert "lacks 1 of 2 sequences (1)" in wrong[0]
+    assert wrong[1].startswith(f"{path} is not as it was written")
+    code, out, err = call("dataset", "--verify", copy.folder)
+    assert (code, str(path) in out) == (2, True)
+    assert "is not whole: 2 things are wrong" in err
+    assert "1 are left" in call("dataset", "--status", "--out", copy.folder)[1]
+
+
+def test_a_sequence_that_fails_is_tried_twice_and_does_not_stop_the_others(monkeypatch, quick):
+    data, order = quick
+    works, tried = making.make, []
+
+    def make(data: DataSet, number: int, progress=None) -> Made:
+        tried.append(number)
+        if number == 1:
+            raise ValueError("no luck")
+        return works(data, number)
+
+    monkeypatch.setattr(making, "make", make)
+    told: list[str] = []
+    outcome = making.make_all(data, range(3), tell=told.append)
+    assert tried == [0, 1, 2, 1]
+    assert (outcome.made, outcome.failed) == ([0, 2], {1: "no luck"})
+    assert told == ["sequence 1 failed and gets a second try: no luck"]
+    assert data.failed() == data.status().failed == [1]
+    assert (data.folder / "failures/000001.txt").read_text().count("ValueError: no luck") == 2
+    monkeypatch.setattr(making, "make", works)
+    assert making.make_all(data, range(3)).made == [0, 2, 1]
+    assert data.failed() == []
+
+
+def test_a_full_disk_ends_it(monkeypatch, quick):
+    data, _ = quick
+
+    def full(data: DataSet, number: int, progress=None) -> Made:
+        raise InputError("the disk is full") from OSError(28, "No space left on device")
+
+    monkeypatch.setattr(making, "make", full)
+    with pytest.raises(InputError, match="the disk is full"):
+        making.make_all(data, range(3))
+
+
+def test_a_sequence_that_another_process_makes_is_left_to_it(quick):
+    data, order = quick
+    code = ("import sys\nfrom pathlib import Path\nfrom onespp.render.files.lock import writing\n"
+            "with writing(Path(sys.argv[1]), 'sequence'):\n    print('held', flush=True)\n"
+            "    sys.stdin.read()")
+    with subprocess.Popen([sys.executable, "-c", code, str(data.place(0))], text=True,
+                          stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout.readline() == "held\n"
+        outcome = making.make_all(data, range(3))
+        assert (order, outcome.elsewhere) == ([1, 2], [0])
+        other.kill()  # as a machine that is switched off
+    assert making.make_all(data, range(3)).elsewhere == []
+    assert order == [1, 2, 0]
+
+
+def test_parts_make_all_between_them():
+    parts = [making.part_of(range(7), f"{k}/3") for k in (1, 2, 3)]
+    assert sorted(n for part in parts for n in part) == [*range(7)]
+    for part in ("0/3", "4/3", "1", "a/b"):
+        with pytest.raises(InputError, match="use K/N"):
+            making.part_of(range(7), part)
+
+
+def test_a_folder_holds_one_data_set_which_may_grow(quick, plan, tmp_path):
+    data, _ = quick
+    assert DataSet.create(data.folder, changed_plan(plan, {"sequences": 2}), {}).plan == plan
+    more = changed_plan(plan, {"sequences": 9})
+    assert DataSet.create(data.folder, more, {}) == DataSet.open(data.folder)
+    with pytest.raises(InputError, match=r"another plan \(draw.things is \[5, 9\] there"):
+        DataSet.create(data.folder, changed_plan(plan, {"draw.things": [5, 8]}), {})
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/letter.txt").write_text("x")
+    with pytest.raises(InputError, match="no data set"):
+        DataSet.create(tmp_path / "mine", plan, {})
+    with pytest.raises(InputError, match="is not a data set"):
+        DataSet.open(tmp_path / "mine")
+
+
+@pytest.fixture(scope="module")
+def drawn() -> Drawn:
+    return draw(read_plan("simple", {"frames": 2}).request(0))
+
+
+def test_a_camera_in_a_thing_is_noticed(drawn):
+    name = drawn.things[0]
+    shape = next(s for s in drawn.scene.shapes if s.name == name)
+    there = np.eye(4)
+    there[:3, 3] = (shape.world_from_object_at(0) @ (0, 0.1, 0, 1))[:3]
+    scene = replace(drawn.scene, camera=Camera(there))
+    assert look.inside(drawn, [0, 1]) is None
+    assert look.inside(replace(drawn, scene=scene), [0]) == f"the camera is in {name}"
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ({}, None), ({"color": 1e-4}, "is dark"), ({"color": np.nan}, "is dark"),
+    ({"color": 9.0}, "is blown"), ({"depth": 0.3}, "something is in front"),
+    ({"id": -1}, "shows no things")])
+def test_frames_with_nothing_to_see_are_noticed(drawn, change, words):
+    thing = drawn.scene.object_names.index(drawn.things[0])
+    values = {"color": 0.2, "depth": 3.0, "id": thing, **change}
+    seen = look.Seen(1, np.full((16, 16, 3), values["color"]), np.full((16, 16), values["id"]),
+                     np.full((16, 16), values["depth"]))
+    why = look.unlike_a_picture(drawn, [seen])
+    assert why is None if words is None else words in (why or "")
+
+
+def test_noise_does_not_make_a_frame_dark():
+    noisy = np.random.default_rng(1).gamma(0.05, 4.0, (64, 64, 1)) * np.ones(3)
+    assert look.displayed(noisy) > 0.8 * look.displayed(np.full((64, 64, 3), 0.2))
+
+
+def test_a_draw_that_is_rejected_is_drawn_again(monkeypatch, plan):
+    said = iter(["frame 0 is dark", None])
+    monkeypatch.setattr(look, "unlike_a_picture", lambda drawn, frames: next(said))
+    found = look.usable(plan, 0)
+    assert (found.drawn.record["attempt"], found.rejected) == (1, ["frame 0 is dark"])
+    monkeypatch.setattr(look, "unlike_a_picture", lambda drawn, frames: "frame 0 is dark")
+    with pytest.raises(InputError, match="none of 20 draws of sequence 0 of 'simple'"):
+        look.usable(plan, 0)
