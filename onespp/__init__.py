@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from onespp.api.loading import animate, load
     from onespp.api.rendering import open, render, scenes
     from onespp.api.scoring import Report, compare, metrics, report, score
+    from onespp.clips.clips import Clips
     from onespp.datasets.folder import DataSet
     from onespp.denoise.score.scorecard import Scores
     from onespp.render.errors import InputError
@@ -36,9 +37,9 @@ if TYPE_CHECKING:
     from onespp.render.frame import Frame
     from onespp.scenes.description import Scene, SceneError
 
-__all__ = ["DataSet", "Frame", "FrameSequence", "InputError", "Report", "Scene", "SceneError",
-           "Scores", "animate", "compare", "dataset", "denoise", "load", "method", "methods", "metrics", "open",
-           "render", "report", "scenes", "score"]
+__all__ = ["Clips", "DataSet", "Frame", "FrameSequence", "InputError", "Report", "Scene",
+           "SceneError", "Scores", "animate", "compare", "dataset", "denoise", "load", "method",
+           "methods", "metrics", "open", "render", "report", "scenes", "score"]
 
 _PLACES = {
     "onespp.api.datasets": ("dataset",),
@@ -46,6 +47,7 @@ _PLACES = {
     "onespp.api.loading": ("animate", "load"),
     "onespp.api.rendering": ("open", "render", "scenes"),
     "onespp.api.scoring": ("Report", "compare", "metrics", "report", "score"),
+    "onespp.clips.clips": ("Clips",),
     "onespp.datasets.folder": ("DataSet",),
     "onespp.denoise.score.scorecard": ("Scores",),
     "onespp.render.errors": ("InputError",),

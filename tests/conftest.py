@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+import onespp
 from onespp.cli import app
+from onespp.datasets.folder import DataSet
 from onespp.render.cli.terminal import run as run_command
 from tests.support.places import GAMES202
 
@@ -18,6 +20,16 @@ def games202() -> Path:
     if not GAMES202.is_dir():
         pytest.skip("the GAMES202 box frames are not in ../shared/data/games202-box")
     return GAMES202
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory) -> DataSet:
+    """A small data set: sequence 0, to train on, and 1, to validate; 3 frames of 16x24, two renders
+    of each."""
+    return onespp.dataset("simple", tmp_path_factory.mktemp("data") / "set", sequences=2, frames=3,
+                          size=(16, 24), seeds=2, reference_spp=16,
+                          changes={"draw.cameras": ["orbit"], "draw.speed": [3, 3],
+                                   "split.validation": 0.3})
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ ROOMS = (
     "onespp.__main__", "onespp.cli", "onespp.templates", "onespp.denoise.cli", "onespp.render.cli",
     "onespp", "onespp.api",
     "onespp.datasets.pool", "onespp.datasets.preview", "onespp.datasets.making",
-    "onespp.datasets.look", "onespp.datasets",
+    "onespp.datasets.look", "onespp.clips", "onespp.datasets",
     "onespp.denoise.report", "onespp.denoise.bench", "onespp.denoise.studies",
     "onespp.denoise.run", "onespp.denoise.score",
     "onespp.denoise.catalog", "onespp.denoise.peers",
@@ -173,7 +173,7 @@ def test_a_broken_rule_is_noticed(module: str, line: str, complaint: str):
 
 def test_a_folder_holds_3_to_12_files():
     folders = {path.parent for top in ("scenes", "render", "denoise", "onespp/api", "onespp/show",
-                                             "onespp/datasets")
+                                             "onespp/datasets", "onespp/clips")
                for path in (ROOT / top).rglob("*.py")}
     sizes = {str(folder.relative_to(ROOT)): len([
         p for p in folder.iterdir() if p.suffix == ".py" and p.stem != "__init__"])
@@ -195,7 +195,7 @@ def test_every_folder_is_a_package_that_is_installed():
 
 @pytest.mark.parametrize("module", [
     "onespp", "onespp.render", "onespp.render.files", "onespp.denoise", "onespp.denoise.metrics",
-    "onespp.denoise.score", "onespp.scenes", "onespp.datasets.folder"])
+    "onespp.denoise.score", "onespp.scenes", "onespp.clips.clips"])
 def test_what_is_light_loads_no_kernels(module: str):
     code = (f"import sys, pkgutil, importlib; m = importlib.import_module('{module}')\n"
             "heavy = {'drjit', 'mitsuba', 'click', 'matplotlib', 'PIL'} & set(sys.modules)\n"

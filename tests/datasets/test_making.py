@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -24,6 +25,13 @@ from onespp.scenes.drawn.draw import Drawn, draw
 def files(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes()
             for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+@pytest.fixture
+def copy(made, tmp_path) -> DataSet:
+    """A copy of the small data set that a test may change."""
+    shutil.copytree(made.folder, tmp_path / "copy")
+    return DataSet.open(tmp_path / "copy")
 
 
 @pytest.fixture
@@ -95,7 +103,7 @@ def test_a_byte_that_changed_and_a_sequence_that_is_gone_are_found(copy, call):
 
 
 def test_a_sequence_that_fails_is_tried_twice_and_does_not_stop_the_others(monkeypatch, quick):
-    data, order = quick
+    data, _ = quick
     works, tried = making.make, []
 
     def make(data: DataSet, number: int, progress=None) -> Made:

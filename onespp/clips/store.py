@@ -1,0 +1,90 @@
+"""Frames of a data set's sequences: decoded each time, or kept as memory maps.
+
+In the cache there is an .npy file for each channel of each render, all frames in one, in the type
+that the sequence stores. It is named after the hash of the sequence's files: of one that was made
+anew nothing old is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from onespp.datasets.folder import DataSet
+from onespp.render.channels import CHANNELS
+from onespp.render.errors import InputError
+from onespp.render.files.atomic import replacing
+from onespp.render.files.sequence import FrameSequence
+
+from .motion import Matrices
+
+REFERENCE, HALF = "reference", "reference-half"
+_MATRICES = ("camera_from_world", "screen_from_world", "world_from_object")
+
+
+@dataclass(frozen=True)
+class Store:
+    """Where frames come from. cache: a folder for memory maps, or None."""
+
+    data: DataSet
+    cache: Path | None = None
+
+    def images(self, number: int, k: int, i: int, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Channels of frame i of the k-th render of a sequence, (h, w) or (h, w, c), whole.
+
+        `REFERENCE` is the reference, `HALF` its first half minus itself.
+        """
+        if self.cache is not None:
+            return {name: self._mapped(number, k, name)[i] for name in names}
+        return _decoded(self.data.sequence(number, k), i, names)
+
+    def matrices(self, number: int, i: int) -> Matrices:
+        """Of frame i."""
+        if self.cache is None:
+            return Matrices(*self.data.sequence(number).read_matrices(i))
+        return Matrices(*(np.array(self._mapped(number, 0, name)[i]) for name in _MATRICES))
+
+    def _mapped(self, number: int, k: int, name: str) -> np.ndarray:
+        assert self.cache is not None
+        made = self.data.made(number)
+        if made is None:
+            raise InputError(f"{self.data.place(number)} is not whole: run `onespp dataset` again")
+        path = self.cache / f"{made.digest[:24]}-{k}-{name}.npy"
+        if not path.exists():
+            array = self._whole(number, k, name)
+            with replacing(path) as temporary, open(temporary, "wb") as file:
+                np.save(file, array, allow_pickle=False)
+        try:
+            return np.load(path, mmap_mode="r", allow_pickle=False)
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path} is damaged ({error}): delete it") from error
+
+    def _whole(self, number: int, k: int, name: str) -> np.ndarray:
+        """All frames of a channel, or of the matrices, in the type that is stored."""
+        sequence = self.data.sequence(number, k)
+        if name in _MATRICES:
+            at = _MATRICES.index(name)
+            return np.stack([sequence.read_matrices(i)[at] for i in sequence.frames])
+        found = np.stack([_decoded(sequence, i, [name])[name] for i in sequence.frames])
+        stored = name in sequence.manifest.channels and CHANNELS[name].is_half(
+            sequence.manifest.half)
+        return found.astype(np.float16) if stored or name == HALF else found
+
+
+def _decoded(sequence: FrameSequence, i: int, names: Sequence[str]) -> dict[str, np.ndarray]:
+    truth = [name for name in names if name in (REFERENCE, HALF)]
+    channels = [name for name in names if name not in truth]
+    found = dict(sequence.read_frame(i, channels).images) if channels else {}
+    if truth:
+        reference = sequence.read_reference(i)
+        found[REFERENCE] = reference.color
+        if HALF in truth:
+            if reference.parts is None:
+                raise InputError(f"{sequence.folder} has references without halves: render them "
+                                 "again")
+            half = (reference.parts[0] + reference.parts[1]) / 2 - reference.color
+            found[HALF] = half.astype(np.float16).astype(np.float32)  # as it is stored
+    return found
