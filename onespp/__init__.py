@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from onespp.api.datasets import dataset
     from onespp.api.denoising import denoise, method, methods
+    from onespp.api.importing import import_frames
     from onespp.api.loading import animate, load
     from onespp.api.rendering import open, render, scenes
     from onespp.api.scoring import Report, compare, metrics, report, score
@@ -38,12 +39,13 @@ if TYPE_CHECKING:
     from onespp.scenes.description import Scene, SceneError
 
 __all__ = ["Clips", "DataSet", "Frame", "FrameSequence", "InputError", "Report", "Scene",
-           "SceneError", "Scores", "animate", "compare", "dataset", "denoise", "load", "method",
-           "methods", "metrics", "open", "render", "report", "scenes", "score"]
+           "SceneError", "Scores", "animate", "compare", "dataset", "denoise", "import_frames",
+           "load", "method", "methods", "metrics", "open", "render", "report", "scenes", "score"]
 
 _PLACES = {
     "onespp.api.datasets": ("dataset",),
     "onespp.api.denoising": ("denoise", "method", "methods"),
+    "onespp.api.importing": ("import_frames",),
     "onespp.api.loading": ("animate", "load"),
     "onespp.api.rendering": ("open", "render", "scenes"),
     "onespp.api.scoring": ("Report", "compare", "metrics", "report", "score"),

@@ -36,7 +36,7 @@ ROOMS = (
     "onespp.render.doctor", "onespp.render.trials", "onespp.render.job",
     "onespp.render.references", "onespp.render.study", "onespp.render.tracer",
     "onespp.render.scene_files",
-    "onespp.render.mitsuba", "onespp.render.games202",
+    "onespp.render.mitsuba", "onespp.render.foreign", "onespp.render.games202",
     "onespp.render", "onespp.render.files", "onespp.render.host",
     "onespp.render.derived", "onespp.render.frame", "onespp.render.guides_camera",
     "onespp.render.channels",

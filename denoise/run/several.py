@@ -75,6 +75,6 @@ def what_to_know(sequence: FrameSequence, default: bool) -> Iterator[str]:
 def _gaps(sequence: FrameSequence) -> list[tuple[int, int]]:
     """Neighbours between which frames are missing; a stride that was asked for misses none."""
     there = [i for i in sequence.frames if sequence.has_frame(i)]
-    known = gaps(there) if sequence.manifest.source == "games202" else []
+    known = gaps(there) if sequence.manifest.source != "render" else []
     return [(a, b) for a, b in pairwise(there)
             if (a, b) in known or any(a < i < b for i in sequence.frames)]

@@ -6,6 +6,7 @@ import click
 
 from onespp.denoise.cli.ablate import ablate
 from onespp.denoise.cli.bench import bench
+from onespp.denoise.cli.check import check
 from onespp.denoise.cli.compare import compare
 from onespp.denoise.cli.denoise import denoise
 from onespp.denoise.cli.report import report
@@ -14,7 +15,8 @@ from onespp.denoise.cli.time import time_
 from onespp.denoise.cli.truth import truth
 from onespp.denoise.cli.tune import tune
 from onespp.denoise.cli.view import view
-from onespp.render.cli.render import export, import_, render
+from onespp.render.cli.imports import import_
+from onespp.render.cli.render import export, render
 from onespp.render.cli.terminal import run as run_command
 
 from .completion import completion
@@ -40,7 +42,7 @@ def app() -> None:
 
 
 for command in (scenes, render, denoise, time_, score, run, report, view, compare, bench, tune,
-                ablate, lead, truth, hard, dataset, import_, export, new, doctor,
+                ablate, lead, truth, hard, dataset, import_, check, export, new, doctor,
                 completion):
     command.epilog = EXIT_CODES.get(command.name or "", EXIT_CODES[""])
     app.add_command(command)

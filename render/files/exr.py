@@ -1,27 +1,25 @@
-"""OpenEXR files: one scanline image of any named channels, lossless, checked before it is decoded.
+"""OpenEXR files, checked before they are decoded: ours, one scanline image of any named channels,
+lossless; and those of other programs, tiled, in several parts or lossy.
 
 ZIP compression: of the lossless ones that every viewer reads it makes the smallest files of noisy
 frames, and decodes as fast as any.
 
 The OpenEXR library trusts a header's size, returns partial images for truncated files, and tells
-about damage on the terminal. So the header and the chunk table are parsed here first: a file that
-passes is complete and no larger than it claims, and only damage inside a compressed chunk is left
-for the library to find. It reads by `OpenEXR.File`: the older `InputFile`, which is deprecated, has
-worker threads read a Python stream without the interpreter's lock, and that ends the process from
-Python 3.12 on. Layout: https://openexr.com/en/latest/OpenEXRFileLayout.html
+about damage on the terminal. So `exr_header.py` comes first, and only damage inside a compressed
+chunk is left for the library to find. It reads by `OpenEXR.File`: the older `InputFile`, which is
+deprecated, has worker threads read a Python stream without the interpreter's lock, and that ends
+the process from Python 3.12 on.
 """
 
 from __future__ import annotations
 
 import io
-import math
 import os
 import struct
 import sys
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, TextIO
@@ -31,30 +29,9 @@ import numpy as np
 from onespp.render.errors import InputError
 
 from .atomic import read_bytes, write_bytes
+from .exr_header import TYPES, Header, MalformedError, parse
 
-_MAGIC = b"\x76\x2f\x31\x01"
-_TYPES = (np.dtype(np.uint32), np.dtype(np.float16), np.dtype(np.float32))
-_ROWS = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32}  # rows a chunk: none, RLE, ZIPS, ZIP, PIZ
-_MAX_SIDE = 1 << 16
 MOST_NAMED = 24  # channels in one sentence
-_MAX_RATIO = 1100  # deflate, the strongest of these, cannot exceed 1032
-
-
-@dataclass(frozen=True)
-class Header:
-    """What an EXR file says about itself.
-
-    Attributes:
-        height, width: of the data window.
-        channels: name -> pixel type.
-        attributes: the header's strings.
-    """
-
-    height: int
-    width: int
-    channels: Mapping[str, np.dtype]
-    attributes: Mapping[str, str]
-
 
 def write_exr(path: Path, channels: Mapping[str, np.ndarray],
               header: Mapping[str, str] | None = None, durable: bool = False) -> None:
@@ -75,7 +52,7 @@ def write_exr(path: Path, channels: Mapping[str, np.ndarray],
         raise InputError(f"{path} could not be written because its channels have the shapes "
                          f"{sorted(shapes)}, not one (h, w)")
     for name, image in channels.items():
-        if image.dtype not in _TYPES:
+        if image.dtype not in TYPES:
             raise InputError(f"{path} could not be written because channel '{name}' is "
                              f"{image.dtype}: use float32, float16 or uint32")
     attributes = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage,
@@ -103,7 +80,7 @@ def read_exr(path: Path, channels: Iterable[str] | None = None,
             incomplete, damaged, of another size, or without a channel that was asked for.
     """
     data = read_bytes(path)
-    header = _check(path, data)
+    header, = _check(path, data)
     if size is not None and (header.height, header.width) != tuple(size):
         raise InputError(f"{path} is {header.width}x{header.height} pixels, "
                          f"expected {size[1]}x{size[0]}")
@@ -114,25 +91,51 @@ def read_exr(path: Path, channels: Iterable[str] | None = None,
         more = f" and {len(there) - MOST_NAMED} more" if len(there) > MOST_NAMED else ""
         raise InputError(f"{path} lacks the channel {', '.join(missing[:MOST_NAMED])} "
                          f"(it has {', '.join(map(repr, there[:MOST_NAMED]))}{more})")
-    images = _decode(path, data, header, names)
-    return images, header
+    decoded, = _decode(path, data, [header])
+    return {name: decoded[name] for name in names}, header
 
 
 def read_header(path: Path) -> Header:
     """The header of a complete image, without its pixels; InputError as `read_exr`."""
-    return _check(path, read_bytes(path))
+    return _check(path, read_bytes(path))[0]
 
 
-def _decode(path: Path, data: bytes, header: Header, names: list[str]) -> dict[str, np.ndarray]:
-    """name -> read-only pixels of a file that `_check` has passed."""
+def read_any_exr(path: Path) -> dict[str, np.ndarray]:
+    """All channels of an image of any program: in any number of parts, tiled, lossy.
+
+    Returns:
+        name -> (h, w) read-only array. Where several parts have channels of one name, those of all
+        but the first are called PART.NAME.
+
+    Raises:
+        InputError: not an EXR, deep, of several resolutions, incomplete, damaged, or in parts of
+            different sizes.
+    """
+    data = read_bytes(path)
+    headers = _check(path, data, any_kind=True)
+    sizes = list(dict.fromkeys((h.width, h.height) for h in headers))
+    if len(sizes) > 1:
+        texts = " and ".join(f"{w}x{h}" for w, h in sizes[:2])
+        raise InputError(f"{path} has parts of {texts} pixels: save one size in a file")
+    images: dict[str, np.ndarray] = {}
+    for header, planes in zip(headers, _decode(path, data, headers)):
+        for name, image in planes.items():
+            images[f"{header.attributes.get('name', '')}.{name}" if name in images else name
+                   ] = image
+    return images
+
+
+def _decode(path: Path, data: bytes, headers: list[Header]) -> list[dict[str, np.ndarray]]:
+    """name -> read-only pixels of each part of a file that `_check` has passed."""
     import OpenEXR
 
     stream = io.BytesIO(data)
     with _unprinted() as said:
         try:
             with OpenEXR.File(stream, separate_channels=True, num_threads=_threads()) as file:
-                decoded = file.channels()  # ValueError where decoding failed: that is only printed
-                images = {name: decoded[name].pixels for name in names}
+                file.channels()  # ValueError where decoding failed: that is only printed
+                decoded = [{name: part.channels[name].pixels for name in header.channels}
+                           for part, header in zip(file.parts, headers, strict=True)]
         except MemoryError:
             raise
         except Exception as error:  # whatever C++ or a strange header's objects come up with
@@ -142,11 +145,12 @@ def _decode(path: Path, data: bytes, header: Header, names: list[str]) -> dict[s
             why = "".join(c for c in why if c.isprintable())[:100]
             raise InputError(f"{path} is damaged and cannot be decoded ({why}): make it again"
                              ) from error
-    for name, image in images.items():
-        if image.shape != (header.height, header.width) or image.dtype != header.channels[name]:
-            raise InputError(f"{path} is damaged and cannot be decoded: make it again")
-        image.flags.writeable = False
-    return images
+    for header, images in zip(headers, decoded):
+        for name, image in images.items():
+            if image.shape != (header.height, header.width) or image.dtype != header.channels[name]:
+                raise InputError(f"{path} is damaged and cannot be decoded: make it again")
+            image.flags.writeable = False
+    return decoded
 
 
 class _Listener:
@@ -191,101 +195,10 @@ def _threads() -> int:
     return count
 
 
-class _Malformed(Exception):
-    """What is wrong with a file, as the end of a sentence that begins with its path."""
-
-
-def _check(path: Path, data: bytes) -> Header:
+def _check(path: Path, data: bytes, any_kind: bool = False) -> list[Header]:
     try:
-        return _parse(data)
-    except _Malformed as error:
+        return parse(data, any_kind)
+    except MalformedError as error:
         raise InputError(f"{path} {error}") from None
     except (struct.error, IndexError, ValueError):  # ran past the end, or text that is not UTF-8
         raise InputError(f"{path} is truncated or damaged: make it again") from None
-
-
-def _parse(data: bytes) -> Header:
-    if data[:4] != _MAGIC:
-        raise _Malformed("is empty" if not data else "is not an OpenEXR file")
-    version, = struct.unpack_from("<I", data, 4)
-    for bit, kind in ((0x1000, "a multi-part"), (0x800, "a deep"), (0x200, "a tiled")):
-        if version & bit:
-            raise _Malformed(f"is {kind} OpenEXR file: save it as a single-part scanline image")
-    attributes, table = _attributes(data)
-    if _value(attributes, "type", "string", b"scanlineimage") != b"scanlineimage":
-        raise _Malformed("is not a scanline OpenEXR file: save it as one")
-    channels = _channel_list(_value(attributes, "channels", "chlist"))
-    compression = _value(attributes, "compression", "compression")[0]
-    if compression not in _ROWS:
-        raise _Malformed("is compressed in a way not read here: save it with ZIP compression")
-    left, top, right, bottom = struct.unpack("<4i", _value(attributes, "dataWindow", "box2i"))
-    width, height = right - left + 1, bottom - top + 1
-    if not (0 < width <= _MAX_SIDE and 0 < height <= _MAX_SIDE):
-        raise _Malformed(f"claims to be {width}x{height} pixels: make it again")
-    pixel_bytes = sum(dtype.itemsize for dtype in channels.values())
-    if height * width * pixel_bytes > _MAX_RATIO * len(data):
-        raise _Malformed(f"claims to be {width}x{height} pixels but is only {len(data)} bytes "
-                         "long: make it again")
-    _check_chunks(data, table, _ROWS[compression], top, height)
-    strings = {name: value.decode() for name, (kind, value) in attributes.items()
-               if kind == "string"}
-    return Header(height, width, channels, strings)
-
-
-def _string(data: bytes, start: int) -> tuple[str, int]:
-    """A null-terminated name and the offset behind it."""
-    end = data.index(b"\0", start, start + 256)
-    return data[start:end].decode(), end + 1
-
-
-def _attributes(data: bytes) -> tuple[dict[str, tuple[str, bytes]], int]:
-    """Name -> (type, value), and the offset of the chunk table behind the header."""
-    attributes, at = {}, 8
-    while data[at] != 0:
-        name, at = _string(data, at)
-        kind, at = _string(data, at)
-        size, = struct.unpack_from("<I", data, at)
-        if name in attributes:  # the library might go by the other one
-            raise _Malformed(f"has two {name!r} in its header: make it again")
-        if at + 4 + size >= len(data):
-            raise IndexError
-        attributes[name] = (kind, data[at + 4:at + 4 + size])
-        at += 4 + size
-    return attributes, at + 1
-
-
-def _value(attributes: Mapping[str, tuple[str, bytes]], name: str, kind: str,
-           default: bytes | None = None) -> bytes:
-    found, value = attributes.get(name, (kind, default))
-    if found != kind or value is None:
-        raise _Malformed(f"has no valid '{name}' in its header: make it again")
-    return value
-
-
-def _channel_list(data: bytes) -> dict[str, np.dtype]:
-    channels, at = {}, 0
-    while data[at] != 0:
-        name, at = _string(data, at)
-        kind, _, x_step, y_step = struct.unpack_from("<4i", data, at)
-        if not 0 <= kind < len(_TYPES):
-            raise _Malformed(f"has a channel {name!r} of an unknown type: make it again")
-        if (x_step, y_step) != (1, 1):
-            raise _Malformed(f"has a subsampled channel {name!r}: save it at full resolution")
-        if name in channels:
-            raise _Malformed(f"has two channels {name!r}: make it again")
-        channels[name] = _TYPES[kind]
-        at += 16
-    if not channels:
-        raise _Malformed("has no channels: make it again")
-    return channels
-
-
-def _check_chunks(data: bytes, table: int, rows: int, top: int, height: int) -> None:
-    """Every block of rows is there, whole, and where the table says."""
-    count = math.ceil(height / rows)
-    for i, offset in enumerate(struct.unpack_from(f"<{count}Q", data, table)):
-        if not table + 8 * count <= offset <= len(data) - 8:
-            raise _Malformed("is incomplete or truncated: make it again")
-        row, size = struct.unpack_from("<2i", data, offset)
-        if row != top + i * rows or not 0 <= size <= len(data) - 8 - offset:
-            raise _Malformed("is truncated or damaged: make it again")

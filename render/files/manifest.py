@@ -59,7 +59,7 @@ class Manifest(JsonFile):
     model_config = ConfigDict(validate_default=True)
 
     format: Annotated[int, Field(ge=FORMAT, le=FORMAT)] = FORMAT
-    source: Literal["render", "games202"] = "render"
+    source: Literal["render", "games202", "foreign"] = "render"
     scene: Name
     about: str = ""
     frames: Annotated[tuple[int, ...], BeforeValidator(_frames),
@@ -89,7 +89,7 @@ class Manifest(JsonFile):
     @field_validator(*_UNKNOWN)
     @classmethod
     def _known_of_renders_only(cls, value: Any, info: ValidationInfo) -> Any:
-        return None if info.data.get("source") == "games202" else value
+        return value if info.data.get("source", "render") == "render" else None
 
     @field_validator("channels")
     @classmethod

@@ -250,8 +250,11 @@ class FrameSequence:
         path = self._path("reference", i)
         if self.has_parts(i):
             return Reference._of_images(self._read(path, REFERENCE), self._spp(path))
-        images = self._read(path, ("color", "variance"))
-        return Reference(images["color"], images["variance"], self._spp(path))
+        known = set(CHANNELS["variance"].exr) <= set(read_header(path).channels)
+        images = self._read(path, ("color", "variance") if known else ("color",))
+        color = images["color"]  # of another program's, the variance is not known
+        return Reference(color, images.get("variance", np.full_like(color, np.nan)),
+                         self._spp(path))
 
     def has_parts(self, i: int) -> bool:
         """Whether a frame's reference has independent parts, so is of no older version."""
@@ -364,7 +367,8 @@ class FrameSequence:
         write_exr(path, planes, header, durable)
 
     def _spp(self, path: Path) -> int | None:
-        text = read_header(path).attributes.get("spp", "")
+        unsaid = "" if self.manifest.source == "render" else _UNKNOWN
+        text = read_header(path).attributes.get("spp", unsaid)
         if text == _UNKNOWN:
             return None
         if not re.fullmatch(r"[1-9][0-9]{0,8}", text):

@@ -103,6 +103,11 @@ def _suffix(stem: str) -> str:
     return ".mat" if stem == "matrix" else ".exr"
 
 
+def has_matrices(folder: Path) -> bool:
+    """Whether it has the assignment's matrices, by itself or in `input`; InputError: no folder."""
+    return any(numbered(place, "matrix") for place in (folder, *_inside((folder,), (_INPUT,))))
+
+
 def _has_frames(folder: Path) -> bool:
     return any(numbered(folder, stem) for stem in STEMS)
 

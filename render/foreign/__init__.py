@@ -1,0 +1,1 @@
+"""Frames of other renderers, from EXR files of any channel names."""

@@ -1,0 +1,216 @@
+"""Frames of other renderers: by Blender's names, by Mitsuba's, by the user's own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from onespp.api.importing import import_frames, unfit_methods
+from onespp.denoise.geometry.correspondence import NOWHERE, previous_pixel
+from onespp.denoise.studies.agreement import AS_IT_IS, agreement
+from onespp.render.errors import InputError
+from onespp.render.files.exr import read_any_exr
+from onespp.render.foreign.camera_of_positions import camera_of_positions
+from onespp.render.foreign.channel_maps import channel_map, parse_channels
+from onespp.render.frame import Frame
+from onespp.render.tracer.renderer import Renderer
+from onespp.scenes import catalog
+
+SIZE = (40, 56)
+NAMES = ("color", "albedo", "normal", "position", "depth", "id")
+
+
+@pytest.fixture(scope="module")
+def frames() -> list[Frame]:
+    """Of `box`, in which a ball moves and the camera stands; some frames apart, so that it is
+    seen to."""
+    renderer = Renderer(catalog.load("box"), *SIZE)
+    return [renderer.frame(i, 0, NAMES) for i in (4, 8, 12)]
+
+
+def motion(before: Frame, now: Frame) -> np.ndarray:
+    """(h, w, 2) pixels to where each surface was, y down; 0 where there is none."""
+    y, x = np.indices(SIZE) + 0.5
+    found = np.zeros((*SIZE, 2))
+    for i, (m0, m1) in enumerate(zip(before.world_from_object, now.world_from_object)):
+        p = np.concatenate([now["position"], np.ones((*SIZE, 1))], -1).astype(np.float64)
+        at = p @ (before.screen_from_world @ m0 @ np.linalg.inv(m1)).T
+        here = now["id"] == i
+        found[here] = (at[..., :2] / at[..., 3:] - np.stack([x, y], -1))[here]
+    return found
+
+
+def write(path: Path, *parts: Mapping[str, np.ndarray], **header) -> None:
+    """An EXR file of one part, or of several, each compressed in another way."""
+    kinds = (OpenEXR.ZIP_COMPRESSION, OpenEXR.PIZ_COMPRESSION, OpenEXR.RLE_COMPRESSION)
+    made = [OpenEXR.Part({"compression": kinds[k % 3], "type": OpenEXR.scanlineimage, **header},
+                         {name: np.ascontiguousarray(image) for name, image in part.items()},
+                         f"part{k}") for k, part in enumerate(parts)]
+    OpenEXR.File(made).write(str(path))
+
+
+def named(source: str, image: np.ndarray, letters: str,
+          dtype: type = np.float32) -> dict[str, np.ndarray]:
+    return {f"{source}.{letter}" if source else letter: plane.astype(dtype)
+            for letter, plane in zip(letters, np.moveaxis(np.atleast_3d(image), -1, 0))}
+
+
+def blender(folder: Path, frames: list[Frame]) -> Path:
+    """Files as Blender's multilayer output: half radiance, vectors with y up, depth 1e10 where
+    there is nothing, objects by any numbers."""
+    folder.mkdir()
+    for k, frame in enumerate(frames):
+        shown = frame["id"] >= 0
+        vector = motion(frames[max(k - 1, 0)], frame) * (1, -1)
+        write(folder / f"shot{k + 1:04d}.exr",
+              named("ViewLayer.Combined", 2 * frame["color"], "RGB", np.float16),
+              named("ViewLayer.Noisy Image", frame["color"], "RGB", np.float16),
+              named("ViewLayer.Depth", np.where(shown, frame["depth"], 1e10), "Z"),
+              named("ViewLayer.Normal", frame["normal"], "XYZ")
+              | named("ViewLayer.Denoising Albedo", frame["albedo"], "RGB", np.float16),
+              named("ViewLayer.Vector", np.concatenate([vector, -vector], -1), "XYZW")
+              | named("ViewLayer.IndexOB", np.where(shown, 7 * frame["id"] + 3, 0), "X"))
+    return folder
+
+
+def mitsuba(folder: Path, frames: list[Frame], position: bool = True) -> Path:
+    """Files as of the integrator `aov`, in tiles."""
+    folder.mkdir()
+    tiles = OpenEXR.TileDescription()
+    tiles.xSize = tiles.ySize = 16
+    tiles.mode = OpenEXR.ONE_LEVEL
+    for k, frame in enumerate(frames):
+        origin = np.linalg.inv(frame.camera_from_world)[:3, 3]
+        distance = np.linalg.norm(frame["position"] - origin, axis=-1)
+        images = (named("", frame["color"], "RGB") | named("alb", frame["albedo"], "RGB")
+                  | named("nn", frame["normal"], "XYZ")
+                  | named("dd", np.where(frame["id"] >= 0, distance, 0), "T"))
+        if position:
+            images |= named("pp", frame["position"], "XYZ")
+        write(folder / f"{k}.exr", images, type=OpenEXR.tiledimage, tiles=tiles)
+    return folder
+
+
+def found_again(sequence, a: int, b: int) -> float:
+    frames = [sequence.read_frame(i, [c for c in ("normal", "depth", "id", "motion")
+                                      if c in sequence.channels]) for i in (a, b)]
+    return float((previous_pixel(*frames) != NOWHERE).mean())
+
+
+def test_what_blender_writes(frames, tmp_path):
+    sequence = import_frames(blender(tmp_path / "b", frames), tmp_path / "out")
+    assert (sequence.frames, sequence.size) == ([1, 2, 3], SIZE)
+    for i, frame in zip(sequence.frames, frames):
+        got = sequence.read_frame(i, [*sequence.channels])
+        np.testing.assert_allclose(got["color"], frame["color"], rtol=1e-3, atol=1e-6)
+        np.testing.assert_allclose(got["depth"], frame["depth"], rtol=1e-6)
+        np.testing.assert_allclose(got["normal"], frame["normal"], atol=1e-6)
+        assert len(np.unique(np.stack([got["id"], frame["id"]]).reshape(2, -1), axis=1).T) == len(
+            np.unique(frame["id"]))  # the same objects, in other numbers
+    moved = sequence.read_frame(2, ["motion"])["motion"]
+    np.testing.assert_allclose(moved, motion(frames[0], frames[1]), atol=1e-3)
+    assert np.abs(moved).max() > 2
+    share = float((previous_pixel(frames[0], frames[1]) != NOWHERE).mean())
+    assert found_again(sequence, 1, 2) == pytest.approx(share, abs=0.02)
+
+
+def test_positions_tell_the_camera(frames, tmp_path):
+    sequence = import_frames(mitsuba(tmp_path / "m", frames), tmp_path / "out")
+    for i, frame in zip(sequence.frames, frames):
+        got = sequence.read_frame(i, ["depth", "position", "albedo"])
+        shown = frame["id"] >= 0
+        np.testing.assert_allclose(got["depth"], frame["depth"], rtol=1e-3, atol=1e-4)
+        np.testing.assert_allclose(got["position"][shown], frame["position"][shown], atol=0.02)
+        np.testing.assert_allclose(got.camera_from_world, frame.camera_from_world, atol=5e-3)
+    assert unfit_methods(sequence) == ["without replay and replay_before there is no asvgf"]
+
+
+def test_distances_need_a_field_of_view_without_positions(frames, tmp_path):
+    folder = mitsuba(tmp_path / "m", frames, position=False)
+    with pytest.raises(InputError, match=r"0.exr has distances .*fov 39"):
+        import_frames(folder, tmp_path / "out")
+    assert not (tmp_path / "out" / "manifest.json").exists()
+    camera = catalog.load("box").camera
+    across = 2 * np.degrees(np.arctan(np.tan(np.radians(camera.fov) / 2) * SIZE[1] / SIZE[0]))
+    sequence = import_frames(folder, tmp_path / "out", fov=float(across))
+    np.testing.assert_allclose(sequence.read_frame(1, ["depth"])["depth"], frames[1]["depth"],
+                               rtol=1e-4)
+
+
+def test_a_file_for_each_pass_and_names_of_ones_own(frames, tmp_path):
+    folder = tmp_path / "passes"
+    folder.mkdir()
+    for k, frame in enumerate(frames):
+        write(folder / f"beauty.{k:03d}.exr", named("", frame["color"], "RGB"))
+        write(folder / f"surface.{k:03d}.exr", named("N", frame["normal"], "xyz")
+              | named("z", frame["depth"], "V"))
+    truth = tmp_path / "truth"
+    truth.mkdir()
+    write(truth / "t_1.exr", named("", frames[1]["color"], "RGB"))
+    channels = {"color": "beauty", "normal": "surface.N", "depth": "surface.z"}
+    sequence = import_frames(folder, tmp_path / "out", channels=channels, reference=truth)
+    np.testing.assert_array_equal(sequence.read_frame(2, ["depth"])["depth"], frames[2]["depth"])
+    assert sequence.has_reference(1)
+    assert not sequence.has_reference(0)
+    with pytest.raises(InputError, match="another content"):  # read otherwise, other frames
+        import_frames(folder, tmp_path / "out", channels={**channels, "normal": "none"})
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    ({}, None), ({"motion_up": False}, "its y turned over"),
+    ({"motion_from": "previous"}, "its direction turned round")])
+def test_motion_read_the_wrong_way_is_named(frames, tmp_path, options, words, call):
+    folder = blender(tmp_path / "b", [frames[0], frames[2]])
+    found = agreement(import_frames(folder, tmp_path / "out", **options))
+    code, out, err = call("check", tmp_path / "out")
+    assert code == 0, err
+    if words is None:
+        assert found.better is None
+        assert found.share > 0.8
+        assert found.readings[AS_IT_IS] == max(found.readings.values())
+    else:
+        assert found.better is not None
+        assert words in found.better
+        assert words in out
+
+
+def test_a_camera_is_not_made_up():
+    y, x = np.indices(SIZE) + 0.5
+    plane = np.stack([x, y, 0 * x], -1)  # fits more cameras than one
+    assert camera_of_positions(plane, np.ones(SIZE, bool)) is None
+    noise = np.random.default_rng(0).random((*SIZE, 3))
+    assert camera_of_positions(noise, np.ones(SIZE, bool)) is None
+
+
+@pytest.mark.parametrize(("images", "given", "words"), [
+    ({"A": 0}, {}, "no radiance"), ({"R": 0, "G": 0, "B": 0}, {"normal": "N"}, "channels of 'N'"),
+    ({"R": 0}, {"colour": "R"}, "names no channel"),
+    ({"a.Combined.R": 0, "b.Combined.R": 0}, {}, "view layers a, b"),
+    ({"R": 0, "G": 0, "B": 0, "p.X": 1, "p.Y": 1, "p.Z": 1, "q.X": 1, "q.Y": 1, "q.Z": 1}, {},
+     "may be the position")])
+def test_what_cannot_be_told_is_asked(images, given, words):
+    images = {name: np.full((4, 4), float(value)) for name, value in images.items()}
+    with pytest.raises(InputError, match=words):
+        channel_map(images, "auto", given)
+    with pytest.raises(InputError, match="NAME=SOURCE"):
+        parse_channels(["normal"])
+
+
+def test_files_of_other_programs_that_are_cut_or_damaged_are_one_sentence(frames, tmp_path):
+    for folder in (blender(tmp_path / "b", frames[:1]), mitsuba(tmp_path / "m", frames[:1])):
+        path = next(folder.iterdir())
+        data, rng = path.read_bytes(), np.random.default_rng(1)
+        read_any_exr(path)
+        for cut in rng.integers(0, len(data), 20):
+            path.write_bytes(data[:cut])
+            with pytest.raises(InputError, match=str(path)):
+                read_any_exr(path)
+        for at in rng.integers(0, len(data), 40):
+            path.write_bytes(data[:at] + bytes([data[at] ^ 255]) + data[at + 1:])
+            with suppress(InputError):  # pixels may be others; nothing else may be raised
+                read_any_exr(path)
