@@ -1,7 +1,7 @@
 """Mitsuba's `path` on a live scene: what users would render references with.
 
-At the scene's own max_depth, without Russian roulette (which a scene's paths are too short for, and
-which would be another estimator), with the independent sampler, Mitsuba's default.
+At the scene's own max_depth, with the independent sampler, Mitsuba's default, and Russian roulette
+where ours has it: for shorter paths it would be another estimator.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import drjit as dr
 import numpy as np
 
 from onespp.render.mitsuba.variant import mi
+from onespp.render.tracer.path import FIRST, SHORT
 from onespp.render.tracer.view import View
 
 NO_ROULETTE = 1 << 20  # the depth at which it would begin
@@ -20,8 +21,9 @@ class MitsubaPath:
 
     def __init__(self, view: View) -> None:
         self.view = view
-        self.integrator = mi.load_dict({"type": "path", "max_depth": view.scene.max_depth,
-                                        "rr_depth": NO_ROULETTE})
+        depth = view.scene.max_depth
+        self.integrator = mi.load_dict({"type": "path", "max_depth": depth,
+                                        "rr_depth": FIRST if depth > SHORT else NO_ROULETTE})
         self.sensor = view.stage.sensor(view.height, view.width)
 
     def render(self, seed: int, spp: int) -> np.ndarray:

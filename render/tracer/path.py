@@ -3,13 +3,14 @@
 Symbols (Veach 1997): beta, throughput of the path so far over its probability; p, a density over
 solid angle; `depth`, segments behind the current vertex.
 
-The estimator is that of Mitsuba's `path` without Russian roulette (a scene's paths are short), but
-that a vertex may compare several points of the lights (`candidates.py`). It differs in what it
-returns: radiance split by the number of scattering events, from one primary
-hit that the G-buffer shares; and what a reflection needs: the part of indirect light whose first
-direction was sampled from a glossy or mirror lobe, and what that path met next. Where a surface has
-several lobes, that is an unbiased share of the whole (each direction counts as glossy with the
-probability that the glossy lobe chose it), not the glossy lobe's value alone: it costs nothing.
+The estimator is that of Mitsuba's `path`, but that a vertex may compare several points of the
+lights (`candidates.py`), and that there is Russian roulette only where paths may have more than
+`SHORT` segments: shorter ones cost little, and all that arrives counts. It differs in what it
+returns: radiance split by the number of scattering events, from one primary hit that the G-buffer
+shares; and what a reflection needs: the part of indirect light whose first direction was sampled
+from a glossy or mirror lobe, and what that path met next. Where a surface has several lobes, that
+is an unbiased share of the whole (each direction counts as glossy with the probability that the
+glossy lobe chose it), not the glossy lobe's value alone: it costs nothing.
 """
 
 from __future__ import annotations
@@ -23,6 +24,10 @@ from onespp.render.mitsuba.variant import mi
 from .candidates import sought_light
 from .lights import DirectLight, Lights, power_heuristic, resample_lights, shape_index
 from .sampler import Sampler, Sobol
+
+SHORT = 8      # segments, up to which paths end by themselves
+FIRST = 5     # segments after which roulette begins, as in Mitsuba
+_LIKELY = 0.95  # the largest probability to go on
 
 LARGEST_VISIBILITY = 1e4  # picks of 16 lights give up to 2560, by what lights.py lets a pick weigh
 
@@ -68,7 +73,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     specular, through_gloss = mi.Color3f(0), mi.Bool(False)
     hit_distance, hit_shape = mi.Float(0), mi.UInt32(0)
     arrived = mi.Color3f(0)  # direct light, but for what purely specular lobes reflect
-    beta = mi.Color3f(1)
+    beta, eta = mi.Color3f(1), mi.Float(1)
     depth = mi.UInt32(0)
     previous_p = mi.Point3f(0)
     bsdf_pdf = mi.Float(1)
@@ -115,6 +120,10 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         previous_p = mi.Point3f(si.p)
         active = inner & (dr.max(beta) > 0)
         depth += 1
+        if dr.hint(max_depth > SHORT, mode="scalar"):
+            eta *= bsdf_sample.eta
+            beta, goes_on = _roulette(beta, eta, depth, sampler.next_1d())
+            active &= goes_on
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         met = active & (depth == 1) & pi.is_valid()
         hit_distance = dr.select(met, pi.t, hit_distance)
@@ -141,7 +150,7 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
     total = mi.Float(end - start) * first.emitter(scene).eval(first)
     ray = mi.Ray3f(ray)
     pi = mi.PreliminaryIntersection3f(pi)
-    beta, depth = mi.Color3f(0), mi.UInt32(0)
+    beta, eta, depth = mi.Color3f(0), mi.Float(1), mi.UInt32(0)
     previous_p, bsdf_pdf, from_delta = mi.Point3f(0), mi.Float(1), mi.Bool(True)
     sample = mi.UInt32(start) - 1
     alive = mi.Bool(False)  # on the way to a hit; at the beginning, all have to start
@@ -157,6 +166,7 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
         sampler.go_on(sample, ~alive)
         running = sample < end
         beta, depth = dr.select(alive, beta, 1), dr.select(alive, depth, 0)
+        eta = dr.select(alive, eta, 1)
         si = dr.select(alive, met, first)
 
         bsdf = si.bsdf()
@@ -171,8 +181,28 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
         previous_p = mi.Point3f(si.p)
         alive = running & (dr.max(beta) > 0)
         depth += 1
+        if dr.hint(max_depth > SHORT, mode="scalar"):
+            eta *= bsdf_sample.eta
+            beta, goes_on = _roulette(beta, eta, depth, sampler.next_1d())
+            alive &= goes_on
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=alive)
     return total
+
+
+def _roulette(beta: mi.Color3f, eta: mi.Float, depth: mi.UInt32,
+              choice: mi.Float) -> tuple[mi.Color3f, mi.Bool]:
+    """Throughput of what goes on, and whether a path does: by what it may still bring.
+
+    Args:
+        eta: product of the relative indices of refraction that it went through. Radiance grows with
+            their square on the way in and falls on the way out, which is no loss.
+
+    Source: as Mitsuba's `path`, with its default depth.
+    """
+    likely = dr.minimum(dr.max(beta) * dr.square(eta), _LIKELY)
+    tried = depth >= FIRST
+    return (dr.select(tried & (likely > 0), beta / likely, beta),
+            ~tried | (choice < likely))
 
 
 def _found_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, previous_p: mi.Point3f,

@@ -26,6 +26,15 @@ def test_furnace_has_the_radiance_of_the_closed_form(max_depth):
         assert_same_mean(mean, variance, value)
 
 
+def test_roulette_leaves_frames_and_references_their_mean():
+    albedo, renderer = 0.9, Renderer(furnace(0.9, EMISSION, 65), 8, 8)
+    for images in ([renderer.sample_sum(0, 0, k, 64) / 64 for k in range(16)],
+                   [renderer.frame(0, k, ("color",))["color"] for k in range(120)]):
+        mean, variance = mean_and_variance([blocks(image, 4) for image in images])
+        assert variance.min() > 1e-8  # without roulette, all paths bring the same
+        assert_same_mean(mean, variance, EMISSION * (1 - albedo**65) / (1 - albedo))
+
+
 def test_furnace_far_from_the_origin_looks_the_same():
     near, far = (Renderer(furnace(ALBEDO, EMISSION, DEPTH, at), 8, 8).frame(0)
                  for at in ((0, 0, 0), (2.0**20, -(2.0**20), 2.0**20)))
