@@ -18,6 +18,7 @@ from onespp.scenes.description import (
     Camera,
     Cylinder,
     Disk,
+    Light,
     Mesh,
     Rectangle,
     Scene,
@@ -281,10 +282,23 @@ def test_environment_image_of_any_size_and_file(size, tmp_path):
 @pytest.mark.parametrize(("environment", "words"), [
     ("no.exr", ["'no.exr'"]), (__file__, ["no image"]), (np.ones((4, 4)), ["(h, w, 3)"]),
     (np.ones((0, 4, 3)), ["pixels"]), (-np.ones((4, 8, 3)), ["-1"]), (lambda frame: 1, ["number"]),
-    (np.full((4, 8, 3), np.nan), ["not finite"]), ({"type": "point"}, ["point"]), (-1, ["-1"])])
+    (np.full((4, 8, 3), np.nan), ["not finite"]), ({"type": "sky"}, ["sunsky"]), (-1, ["-1"]),
+    ({"type": "envmap"}, ["without an image"]), ({"type": "sunsky", "haze": 1.0}, ["'haze'"]),
+    ({"type": "sunsky", "sun_direction": (0, 1)}, ["sun_direction", "three numbers"])])
 def test_environment_that_cannot_be_is_refused(environment, words):
     refused(lambda: MitsubaScene(scene(environment=environment)),
             "environment of scene 't'", *words)
+
+
+@pytest.mark.parametrize(("light", "words"), [
+    (lambda: Light({"type": "area"}), ["point, spot, directional"]),
+    (lambda: Light({"type": "point", "position": (0, 1, 0)}), ["world_from_light"]),
+    (lambda: Light({"type": "point", "intensity": (-1, 0, 0)}), ["'intensity'", "-1"]),
+    (lambda: MitsubaScene(scene(lights=(Light({"type": "spot", "width": 3.0}),))), ["'width'"]),
+    (lambda: scene(lights=({"type": "point"},)), ["among its lights"]),
+    (lambda: Camera(np.eye(4), 40, "z"), ["fov_axis is 'z'", "smaller or larger"])])
+def test_lights_and_axes_that_cannot_be_are_refused(light, words):
+    refused(light, *words)
 
 
 def test_values_in_image_files_are_checked_too(tmp_path):

@@ -84,6 +84,14 @@ def test_lights_without_a_surface_give_the_same_pixels(light: str, tmp_path: Pat
     np.testing.assert_allclose(ours.mean((0, 1)), theirs.mean((0, 1)), rtol=5e-3)
 
 
+def test_a_sky_with_a_sun_is_as_bright_as_mitsubas(tmp_path: Path):
+    theirs, ours = means(written(tmp_path, scene_xml(
+        GROUND + BALL + '<emitter type="sunsky"><float name="turbidity" value="4"/>'
+        '<vector name="sun_direction" value="0.3, -0.4, 0.8"/><float name="sun_scale" value="0.2"/>'
+        '<transform name="to_world"><rotate x="1" angle="-90"/></transform></emitter>')), spp=64)
+    np.testing.assert_allclose(ours.mean(0), theirs.mean(0), rtol=0.01)
+
+
 def test_the_light_of_a_point_in_a_tiny_scene_falls_as_in_a_large_one(tmp_path: Path):
     """Tiny scenes are built in units of their own."""
     light = ('<emitter type="point"><point name="position" value="0, 2, 1"/>'
