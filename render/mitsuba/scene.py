@@ -13,6 +13,7 @@ Traps that this file exists for:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, cast
 
@@ -31,7 +32,7 @@ from onespp.scenes.description import (
     Sphere,
 )
 
-from . import plugins
+from . import merged, plugins
 from .appearance import Appearance
 from .variant import check_variant, mi
 
@@ -49,7 +50,8 @@ class MitsubaScene:
         description: the scene. mi_scene: the live `mi.Scene`, in stage space.
         origin: (3,) float64, world space. unit: a stage unit's length in world units; a point of
             the world is `origin + unit * (its point in stage space)`.
-        id_from_registry: UInt32 table, registry index of a shape -> object ID.
+        id_from_registry: UInt32 table, registry index of a shape -> object ID; of a merged one, the
+            number of objects plus that of its first face among all merged faces.
         frame: the frame it is set to.
 
     Raises:
@@ -67,8 +69,14 @@ class MitsubaScene:
         self._ids = {name: f"shape_{i:06d}" for i, name in enumerate(description.object_names)}
         self._bsdfs: dict[int, Any] = {}
         scene: dict[str, Any] = {"type": "scene"}
+        together = merged.groups(description)
+        alone = {shape.name for shape in description.shapes} - {
+            shape.name for group in together for shape in group}
         for shape in description.shapes:
-            scene[self._ids[shape.name]] = self._load_shape(shape, frame)
+            if shape.name in alone:
+                scene[self._ids[shape.name]] = self._load_shape(shape, frame)
+        for i, group in enumerate(together):
+            scene[f"merged_{i:06d}"] = self._load_merged(f"merged_{i:06d}", group)
         if description.environment is not None:
             scene["environment"] = plugins.environment(
                 description.environment, f"the environment of scene '{description.name}'")
@@ -78,7 +86,7 @@ class MitsubaScene:
                 f"light {i} of scene '{description.name}'")
         self.mi_scene = mi.load_dict(scene, parallel=False, optimize=False)
         self._parameters = mi.traverse(self.mi_scene)
-        self.id_from_registry = self._registry_table()
+        self.id_from_registry, self._id_from_face = self._registry_table(together)
         self._move(frame)  # an updated scene differs from a loaded one by roundings of its rays
 
     def set_frame(self, frame: float) -> None:
@@ -119,10 +127,19 @@ class MitsubaScene:
                 moves.append(self._local(now) @ np.linalg.inv(self._local(then)))
         return np.stack(moves)
 
-    def object_id(self, registry_index: Any) -> mi.Int32:
-        """Object IDs of shapes by their index in the JIT registry; 0 is no shape, -1."""
+    def object_id(self, registry_index: Any, face: Any) -> mi.Int32:
+        """Object IDs of shapes by their index in the JIT registry; 0 is no shape, -1.
+
+        Args:
+            face: of the shape, which tells those apart that were built as one.
+        """
         valid = registry_index != 0
         number = dr.gather(mi.UInt32, self.id_from_registry, registry_index, valid)
+        if self._id_from_face is not None:
+            count = len(self.description.shapes)
+            of_several = valid & (number >= count)
+            number = dr.select(of_several, dr.gather(
+                mi.UInt32, self._id_from_face, number - count + face, of_several), number)
         return dr.select(valid, mi.Int32(number), -1)
 
     @cached_property
@@ -182,15 +199,15 @@ class MitsubaScene:
         properties = mi.Properties()
         for name, part in parts.items():
             properties[name] = part
-        mesh = mi.Mesh(self._ids[shape.name], len(geometry.vertices), len(geometry.faces),
-                       properties, geometry.normals is not None, geometry.uv is not None)
-        parameters = mi.traverse(mesh)
-        if geometry.uv is not None:
-            parameters["vertex_texcoords"] = _buffer(geometry.uv)
-        for key, value in _placed(geometry, local).items():
-            parameters[key] = value
-        parameters.update()
-        return mesh
+        return _built(self._ids[shape.name], _buffers(geometry, local), properties)
+
+    def _load_merged(self, name: str, group: Sequence[Shape]) -> mi.Mesh:
+        """Still meshes of one material as one."""
+        properties = mi.Properties()
+        properties["bsdf"] = self._bsdf(group[0])
+        return _built(name, merged.joined([
+            _buffers(cast(Mesh, shape.geometry), self._local(shape.world_from_object_at(0)))
+            for shape in group]), properties)
 
     def _place(self, shape: Shape, world_from_object: np.ndarray) -> None:
         local = self._local(world_from_object)
@@ -201,18 +218,33 @@ class MitsubaScene:
                 del placed["faces"]
             self._mirrored[shape.name] = mirrored
             for key, value in placed.items():
-                self._parameters[f"{self._ids[shape.name]}.{key}"] = value
+                self._parameters[f"{self._ids[shape.name]}.{key}"] = _jit(value)
         else:
             to_world = mi.Transform4f(_checked(shape, local).tolist())
             dr.make_opaque(to_world)  # else what a shape derives of it is literals in the kernel
             self._parameters[f"{self._ids[shape.name]}.to_world"] = to_world
 
-    def _registry_table(self) -> mi.UInt32:
+    def _registry_table(self, together: Sequence[Sequence[Shape]],
+                        ) -> tuple[mi.UInt32, mi.UInt32 | None]:
+        """`id_from_registry`; and the object ID of each merged face, None where there are none."""
         registry_index = {s.id(): _registry_index(s) for s in self.mi_scene.shapes()}
         table = np.zeros(max(registry_index.values()) + 1, np.uint32)
-        for object_id, name in enumerate(self.description.object_names):
-            table[registry_index[self._ids[name]]] = object_id
-        return aligned(mi.UInt32, table)
+        names = self.description.object_names
+        for object_id, name in enumerate(names):
+            if (index := registry_index.get(self._ids[name])) is not None:
+                table[index] = object_id
+        if not together:
+            return aligned(mi.UInt32, table), None
+        number = {name: object_id for object_id, name in enumerate(names)}
+        faces: list[np.ndarray] = []
+        start = len(names)
+        for i, group in enumerate(together):
+            table[registry_index[f"merged_{i:06d}"]] = start
+            for shape in group:
+                count = len(cast(Mesh, shape.geometry).faces)
+                faces.append(np.full(count, number[shape.name], np.uint32))
+                start += count
+        return aligned(mi.UInt32, table), aligned(mi.UInt32, np.concatenate(faces))
 
 
 def _registry_index(shape: Any) -> int:
@@ -256,19 +288,32 @@ def _checked(shape: Shape, matrix: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def _placed(mesh: Mesh, matrix: np.ndarray) -> dict[str, Any]:
-    """A mesh's buffers after a transform computed in float64."""
+def _placed(mesh: Mesh, matrix: np.ndarray) -> dict[str, np.ndarray]:
+    """A mesh's positions, faces and normals after a transform computed in float64."""
     linear = matrix[:3, :3]
     faces = mesh.faces[:, ::-1] if _mirrors(matrix) else mesh.faces
-    placed: dict[str, Any] = {
-        "vertex_positions": _buffer(mesh.vertices @ linear.T + matrix[:3, 3]),
-        "faces": aligned(mi.UInt32, np.asarray(faces, np.uint32)),
-    }
+    placed = {"vertex_positions": mesh.vertices @ linear.T + matrix[:3, 3],
+              "faces": np.asarray(faces, np.uint32)}
     if mesh.normals is not None:
         normals = mesh.normals @ _cofactors(linear).T * (-1 if _mirrors(matrix) else 1)
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        placed["vertex_normals"] = _buffer(normals / np.where(lengths > 0, lengths, 1))
+        placed["vertex_normals"] = normals / np.where(lengths > 0, lengths, 1)
     return placed
+
+
+def _buffers(mesh: Mesh, matrix: np.ndarray) -> dict[str, np.ndarray]:
+    """All buffers of a mesh at a place."""
+    return ({} if mesh.uv is None else {"vertex_texcoords": mesh.uv}) | _placed(mesh, matrix)
+
+
+def _built(name: str, buffers: dict[str, np.ndarray], properties: Any) -> mi.Mesh:
+    mesh = mi.Mesh(name, len(buffers["vertex_positions"]), len(buffers["faces"]), properties,
+                   "vertex_normals" in buffers, "vertex_texcoords" in buffers)
+    parameters = mi.traverse(mesh)
+    for key, value in buffers.items():
+        parameters[key] = _jit(value)
+    parameters.update()
+    return mesh
 
 
 def _cofactors(linear: np.ndarray) -> np.ndarray:
@@ -277,5 +322,7 @@ def _cofactors(linear: np.ndarray) -> np.ndarray:
     return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
 
 
-def _buffer(array: np.ndarray) -> mi.Float:
+def _jit(array: np.ndarray) -> mi.Float | mi.UInt32:
+    if array.dtype == np.uint32:
+        return aligned(mi.UInt32, array)
     return aligned(mi.Float, array.astype(np.float32))

@@ -44,7 +44,7 @@ def depth(hit: PrimaryHit) -> mi.Float:
 
 
 def object_id(hit: PrimaryHit) -> mi.Int32:
-    return hit.stage.object_id(dr.reinterpret_array(mi.UInt32, hit.si.shape))
+    return hit.stage.object_id(dr.reinterpret_array(mi.UInt32, hit.si.shape), hit.si.prim_index)
 
 
 def roughness(hit: PrimaryHit) -> mi.Float:

@@ -84,7 +84,8 @@ class DirectLight:
 
     light: from the surface to the light's point, 0 where no ray was sent. blocker_distance: from
     the surface to what stopped the ray, 0 if nothing did. light_shape, blocker_shape: index in the
-    JIT registry, 0 for none. groups: None where all lights are one.
+    JIT registry, 0 for none; blocker_face: which of its faces. groups: None where all lights are
+    one.
     """
 
     direct: mi.Color3f
@@ -93,6 +94,7 @@ class DirectLight:
     light_shape: mi.UInt32
     blocker_distance: mi.Float
     blocker_shape: mi.UInt32
+    blocker_face: mi.UInt32
     groups: GroupSample | None = None
 
 
@@ -158,7 +160,8 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     return DirectLight(
         direct, unshadowed,
         dr.select(lit, light.p - si.p, 0), shape_index(light.emitter.get_shape(), lit),
-        dr.select(lit & shadowed, blocker.t, 0), shape_index(blocker.shape, lit & shadowed), sample)
+        dr.select(lit & shadowed, blocker.t, 0), shape_index(blocker.shape, lit & shadowed),
+        blocker.prim_index, sample)
 
 
 def added(lights: list[mi.Color3f], group: mi.UInt32, light: mi.Color3f) -> list[mi.Color3f]:

@@ -38,7 +38,7 @@ class Radiance:
 
     specular: the part of `indirect` that left the first hit through a glossy or mirror lobe.
     hit_distance: from the first hit to the next, 0 if there is none. hit_shape: the shape met
-    there, its index in the JIT registry, 0 if there is none.
+    there, its index in the JIT registry, 0 if there is none; hit_face: which of its faces.
     `unshadowed`, `visibility` and `shadow_ray` are there if direct light was resampled: see
     `render/tracer/lights.py`.
     """
@@ -49,6 +49,7 @@ class Radiance:
     specular: mi.Color3f
     hit_distance: mi.Float
     hit_shape: mi.UInt32
+    hit_face: mi.UInt32
     unshadowed: mi.Color3f | None = None
     visibility: mi.Float | None = None
     shadow_ray: DirectLight | None = None
@@ -71,7 +72,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     pi = mi.PreliminaryIntersection3f(pi)
     emission, direct, indirect = mi.Color3f(0), mi.Color3f(0), mi.Color3f(0)
     specular, through_gloss = mi.Color3f(0), mi.Bool(False)
-    hit_distance, hit_shape = mi.Float(0), mi.UInt32(0)
+    hit_distance, hit_shape, hit_face = mi.Float(0), mi.UInt32(0), mi.UInt32(0)
     arrived = mi.Color3f(0)  # direct light, but for what purely specular lobes reflect
     beta, eta = mi.Color3f(1), mi.Float(1)
     depth = mi.UInt32(0)
@@ -128,8 +129,10 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         met = active & (depth == 1) & pi.is_valid()
         hit_distance = dr.select(met, pi.t, hit_distance)
         hit_shape = dr.select(met, shape_index(pi.shape, met), hit_shape)
+        hit_face = dr.select(met, pi.prim_index, hit_face)
 
-    radiance = Radiance(emission, direct, indirect, specular, hit_distance, hit_shape)
+    radiance = Radiance(emission, direct, indirect, specular, hit_distance, hit_shape,
+                        hit_face)
     return _with_split(radiance, arrived, split)
 
 

@@ -115,14 +115,15 @@ class Renderer(View):
                     "visibility": radiance.visibility,
                     "specular": radiance.specular,
                     "hit_distance": radiance.hit_distance * unit,
-                    "hit_id": self.stage.object_id(radiance.hit_shape),
+                    "hit_id": self.stage.object_id(radiance.hit_shape, radiance.hit_face),
                 }
                 if radiance.shadow_ray is not None:
                     planes |= {
                         "light": radiance.shadow_ray.light * unit,
-                        "light_id": self.stage.object_id(radiance.shadow_ray.light_shape),
+                        "light_id": self.stage.object_id(radiance.shadow_ray.light_shape, 0),
                         "blocker_distance": radiance.shadow_ray.blocker_distance * unit,
-                        "blocker_id": self.stage.object_id(radiance.shadow_ray.blocker_shape),
+                        "blocker_id": self.stage.object_id(radiance.shadow_ray.blocker_shape,
+                                                           radiance.shadow_ray.blocker_face),
                     }
                     if told := radiance.shadow_ray.groups:
                         planes |= {

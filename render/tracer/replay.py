@@ -68,7 +68,8 @@ def _shade_both(view: View, index: int, previous: int,
     ray, _ = rays.at(*view.centres(pixel))
     with dr.suspend_grad():
         si = stage.mi_scene.ray_intersect(ray)
-        point, id_ = mi.Point3f(si.p), stage.object_id(dr.reinterpret_array(mi.UInt32, si.shape))
+        point, id_ = mi.Point3f(si.p), stage.object_id(
+            dr.reinterpret_array(mi.UInt32, si.shape), si.prim_index)
     dr.eval(point, id_)
     old_places = stage.world_from_object()
     old = _shade(view, previous, seed, pixel, point, id_)
@@ -119,7 +120,7 @@ def _shade(view: View, random_frame: int, seed: int, pixel: mi.UInt32, point: mi
         distance = dr.norm(toward)
         ray = mi.Ray3f(origin, toward / distance)
         pi = scene.ray_intersect_preliminary(ray, coherent=True)
-        met = stage.object_id(dr.reinterpret_array(mi.UInt32, pi.shape))
+        met = stage.object_id(dr.reinterpret_array(mi.UInt32, pi.shape), pi.prim_index)
         seen = (id_ >= 0) & (met == id_) & (dr.abs(pi.t - distance) < TOLERANCE * distance)
         sampler = view.new_sampler(keys_from_seed(seed, FRAME_STREAM, random_frame), pixel)
         radiance = trace(scene, ray, pi, sampler, view.scene.max_depth,
