@@ -120,6 +120,8 @@ def _read(plugin: str, options: dict[str, Any], flipped: bool) -> Mesh:
     vertices, faces = rows("vertex_positions", 3), rows("faces", 3).astype(np.int64)
     normals = rows("vertex_normals", 3) if mesh.has_vertex_normals() else None
     uv = rows("vertex_texcoords", 2) if mesh.has_vertex_texcoords() else None
+    if uv is not None:
+        uv = np.where(np.isfinite(uv), uv, 0)
     if normals is not None:
         normals = _with_lengths(normals, vertices, faces)
         normals = -normals if flipped else normals

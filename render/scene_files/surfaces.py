@@ -27,6 +27,7 @@ class Surfaces:
 
     def __init__(self) -> None:
         self._made: dict[int, Material] = {}
+        self._tried: set[Any] = set()
 
     def material(self, node: Node) -> Material:
         """The dictionary of a BSDF.
@@ -62,13 +63,25 @@ class Surfaces:
         return made
 
     def _check(self, node: Node, material: Material) -> None:
-        """Say now what is wrong with it, while it is known where; images are read later."""
-        what = f"this {node.plugin}"
+        """Say now what is wrong with it, while it is known where; images are read later.
+
+        Mitsuba is asked once for each set of plugins, properties and texts: some take long.
+        """
+        what, kind = f"this {node.plugin}", _kind(material)
         try:
             validity.material(material, what)
-            plugins.bsdf(_without_images(material), what)
+            if kind not in self._tried:
+                plugins.bsdf(_without_images(material), what)
+                self._tried.add(kind)
         except SceneError as error:
             raise node.error(str(error)) from None
+
+
+def _kind(value: Any) -> Any:
+    """What a dictionary is but for its numbers, hashable."""
+    if isinstance(value, Mapping):
+        return tuple((key, "" if key == "filename" else _kind(part)) for key, part in value.items())
+    return value if isinstance(value, str | bool) else type(value)
 
 
 def _without_images(value: Mapping[str, Any]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 from onespp.render.scene_files.mitsuba_xml import load_xml
@@ -280,3 +281,31 @@ def test_a_file_or_sensor_that_is_not_there(tmp_path: Path):
         load_xml(path, sensor=1)
     with pytest.raises(SceneError, match=r"has no parameter \$spp: leave out -D spp"):
         load_xml(path, {"spp": "4"})
+
+
+def test_the_command_renders_goes_on_and_refuses_in_one_line(call, tmp_path: Path):
+    path = written(tmp_path, scene_xml(GROUND + BALL + SKY).replace(
+        'name="width" value="24"', 'name="width" value="$w"'))
+    out, words = tmp_path / "out", ("render", path, "-D", "w=12", "--frames", "0:2")
+    moved = ("--camera", "orbit", "--move", "ball=swing")
+    done, text, error = call(*words, *moved, "--out", out)
+    assert (done, error.count("Traceback")) == (0, 0), error
+    assert "of a.xml is not used: the film 'hdrfilm' but for its size, the filter 'box'" in text
+    sequence = FrameSequence.open(out)
+    assert (sequence.manifest.width, sequence.manifest.max_depth) == (12, 3)
+    frames = [sequence.read_frame(i) for i in range(2)]
+    for name in ("world_from_object", "camera_from_world"):
+        a, b = (getattr(frame, name) for frame in frames)
+        assert not np.array_equal(a, b), name
+    for wrong, sentence in (
+            (words[:2], r"the parameter \$w has no value: give it one, as -D w=VALUE"),
+            ((*words, "-D", "h"), "-D h is not understood: use -D NAME=VALUE"),
+            ((*words, "--sensor", 1), "there is no sensor 1: use --sensor 0"),
+            (("render", "box", "-D", "w=12"), "-D is for Mitsuba's XML files, and 'box' is none"),
+            ((*words, "--camera", "fly"), "there is no camera move 'fly'"),
+            ((*words, "--move", "bal=spin"), "no shape 'bal': did you mean 'ball'"),
+            ((*words, "--out", out), "holds a sequence with another content")):
+        done, _, error = call(*wrong)
+        assert done == 2, error
+        assert re.search(sentence, error), error
+        assert error.count("\n") == 1, error
