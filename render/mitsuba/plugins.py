@@ -51,17 +51,10 @@ def bsdf(material: Mapping[str, Any], what: str) -> Any:
     return loaded
 
 
-def area_light(radiance: Any, what: str, of_mesh: bool = False) -> Any:
-    """An area emitter of a colour, an image or a texture's dictionary.
-
-    An image on a mesh is refused: Mitsuba finds its light through uv, of which several triangles
-    may share the same (all sides of `meshes.box` do), and then it is too dark.
-    """
+def area_light(radiance: Any, what: str) -> Any:
+    """An area emitter of a colour, an image or a texture's dictionary."""
     loaded = _load({"type": "area", "radiance": plugin(radiance, Place(what), validity.RADIANCE)},
                    what)
-    if of_mesh and mi.has_flag(loaded.flags(), mi.EmitterFlags.SpatiallyVarying):
-        raise SceneError(f"{what} is a texture on a mesh: use one colour there, or another shape, "
-                         "such as a Rectangle")
     try:
         with _tried(what):
             loaded.eval(_surface())

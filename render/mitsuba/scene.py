@@ -32,7 +32,7 @@ from onespp.scenes.description import (
     Sphere,
 )
 
-from . import merged, plugins
+from . import merged, pictured_lamps, plugins
 from .appearance import Appearance
 from .variant import check_variant, mi
 
@@ -178,8 +178,7 @@ class MitsubaScene:
         emission = shape.emission_at(frame)
         parts = {"bsdf": self._bsdf(shape)}
         if emission is not None:
-            parts["emitter"] = plugins.area_light(
-                emission, f"the emission of shape '{shape.name}'", isinstance(shape.geometry, Mesh))
+            parts["emitter"] = plugins.area_light(emission, f"the emission of shape '{shape.name}'")
         local = self._local(shape.world_from_object_at(frame))
         if isinstance(shape.geometry, Mesh):
             return self._load_mesh(shape, local, parts)
@@ -199,7 +198,16 @@ class MitsubaScene:
         properties = mi.Properties()
         for name, part in parts.items():
             properties[name] = part
-        return _built(self._ids[shape.name], _buffers(geometry, local), properties)
+        mesh = _built(self._ids[shape.name], _buffers(geometry, local), properties)
+        emitter = parts.get("emitter")
+        if (emitter is not None
+                and mi.has_flag(emitter.flags(), mi.EmitterFlags.SpatiallyVarying)
+                and not pictured_lamps.is_found(mesh, geometry)):
+            raise SceneError(f"the emission of shape '{shape.name}' is a texture on a mesh, whose "
+                             "faces share its places or lie outside of it: use one colour there, "
+                             "uv in [0, 1] of which no two faces have the same, or another shape, "
+                             "such as a Rectangle")
+        return mesh
 
     def _load_merged(self, name: str, group: Sequence[Shape]) -> mi.Mesh:
         """Still meshes of one material as one."""

@@ -57,7 +57,7 @@ class Surfaces:
                 if value.kind not in ("bsdf", "texture"):
                     raise value.error(f"a {value.plugin} in a {node.plugin} cannot be rendered "
                                       "here: leave it out")
-                made[key] = self._dictionary(value)
+                made[key.replace(".", "_")] = self._dictionary(value)
             else:
                 made[key] = str(node.path()) if key == "filename" else value
         return made

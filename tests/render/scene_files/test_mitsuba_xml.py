@@ -17,7 +17,7 @@ from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.animation import spin
 from onespp.scenes.description import LONGEST_PATH, SceneError
 from onespp.scenes.fingerprint import fingerprint
-from tests.support.xml_scenes import SCENES, write_png
+from tests.support.xml_scenes import SCENES, write_png, write_quad
 
 PARTS = 4
 
@@ -91,6 +91,19 @@ def test_a_sky_with_a_sun_is_as_bright_as_mitsubas(tmp_path: Path):
         '<vector name="sun_direction" value="0.3, -0.4, 0.8"/><float name="sun_scale" value="0.2"/>'
         '<transform name="to_world"><rotate x="1" angle="-90"/></transform></emitter>')), spp=64)
     np.testing.assert_allclose(ours.mean(0), theirs.mean(0), rtol=0.01)
+
+
+def test_a_picture_on_a_mesh_shines_as_mitsubas(tmp_path: Path):
+    write_quad(tmp_path / "lamp.obj")
+    pixels = np.zeros((4, 4, 3))
+    pixels[:, 3], pixels[0, :2] = (1, 0.5, 0.2), (0.2, 0.3, 1)
+    write_png(tmp_path / "lamp.png", pixels)
+    theirs, ours = means(written(tmp_path, scene_xml(
+        GROUND + BALL + '<shape type="obj"><string name="filename" value="lamp.obj"/>'
+        '<transform name="to_world"><rotate x="1" angle="90"/><translate y="3"/></transform>'
+        '<emitter type="area"><texture type="bitmap" name="radiance">'
+        '<string name="filename" value="lamp.png"/></texture></emitter></shape>')), spp=128)
+    np.testing.assert_allclose(ours.mean(0), theirs.mean(0), rtol=0.015)
 
 
 def test_the_light_of_a_point_in_a_tiny_scene_falls_as_in_a_large_one(tmp_path: Path):
