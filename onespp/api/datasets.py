@@ -9,6 +9,7 @@ from typing import Any
 from onespp.datasets.folder import DataSet
 from onespp.datasets.making import make_all, part_of
 from onespp.datasets.plan import Plan, changed_plan, read_plan
+from onespp.datasets.pool import make_by_pool
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_bytes
 from onespp.render.host.memory import require_memory
@@ -24,7 +25,8 @@ def dataset(plan: str | Path | Plan, out: Path | str, *, sequences: int | None =
             frames: int | None = None, size: tuple[int, int] | None = None,
             seed: int | None = None, seeds: int | None = None, reference_spp: int | None = None,
             reference_error: float | None = None, changes: Mapping[str, Any] | None = None,
-            part: str | None = None) -> DataSet:
+            part: str | None = None, dask: str | None = None, workers: int | None = None,
+            threads: int | None = None) -> DataSet:
     """Make a data set: many different animated scenes, with noisy frames and references.
 
     What the folder holds already is not made again: the same call goes on where it was stopped, and
@@ -39,6 +41,9 @@ def dataset(plan: str | Path | Plan, out: Path | str, *, sequences: int | None =
             that is drawn, how many noisy renders of each frame, and how good references are.
         changes: other settings by key, as {"draw.things": [3, 5], "split.test": 0.2}.
         part: "K/N" makes every N-th sequence only, from the K-th on.
+        dask: "local" for a pool of processes here (`workers` of them, default one a core), or the
+            address of a Dask scheduler whose workers see the folder by the same path.
+        threads: of each worker for kernels.
 
     Returns:
         The data set; `status()` says how far it is, `verify()` reads everything again, and
@@ -59,13 +64,17 @@ def dataset(plan: str | Path | Plan, out: Path | str, *, sequences: int | None =
                    reference_spp=reference_spp, reference_error=reference_error, changes=changes)
     numbers = part_of(range(made.sequences), part)
     require_memory(made.height, made.width)
-    with turn():
-        import onespp.datasets.look  # noqa: F401  # imports Mitsuba
+    if dask is None:
+        with turn():
+            import onespp.datasets.look  # noqa: F401  # imports Mitsuba
     data = DataSet.create(out, made, versions("mitsuba", "drjit", "numpy"))
     who = caller()
     try:
         with who.progress() as report:
-            outcome = make_all(data, numbers, report, who.tell)
+            if dask is None:
+                outcome = make_all(data, numbers, report, who.tell)
+            else:
+                outcome = make_by_pool(data, numbers, dask, workers, threads, report, who.tell)
     finally:
         data.finish()
     for number, why in outcome.failed.items():

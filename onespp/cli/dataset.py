@@ -32,6 +32,11 @@ from onespp.render.errors import InputError
               help="Another setting of the plan, as draw.things=[3,5] or split.test=0.2; may be "
               "given several times.")
 @click.option("--part", metavar="K/N", help="Every N-th sequence only, from the K-th on.")
+@click.option("--dask", metavar="ADDRESS",
+              help="By a pool of processes: local for one here, or the address of a Dask scheduler "
+              "whose workers see the folder by the same path; pip install 'onespp[dask]'.")
+@click.option("--workers", type=click.IntRange(1, 1024), metavar="N",
+              help="Processes of --dask local; default one a core.")
 @click.option("--preview", type=int, metavar="N",
               help="Only draw a contact sheet of the first N scenes: preview.png in the folder, or "
               "DIR-preview.png while there is no data set.")
@@ -42,7 +47,7 @@ from onespp.render.errors import InputError
 @threads_option
 def dataset(plan: str | None, out: Path | None, settings: tuple[str, ...], preview: int | None,
             status: bool, verify: Path | None, device: str, threads: int | None, size: str | None,
-            part: str | None, **numbers) -> None:
+            part: str | None, dask: str | None, workers: int | None, **numbers) -> None:
     """Make a data set by PLAN: simple, rooms, hard, or a TOML file.
 
     Running the same command again makes what is missing, also at the same time on several machines
@@ -63,7 +68,7 @@ def dataset(plan: str | None, out: Path | None, settings: tuple[str, ...], previ
     if status:
         click.echo(str(DataSet.open(folder).status()))
         return
-    use(device, threads)
+    use(device, threads if dask is None else None)
     if preview is not None:
         # Beside the folder while there is no data set: a folder that holds other files is refused.
         sheet = (folder / "preview.png" if (folder / "dataset.json").exists()
@@ -72,7 +77,7 @@ def dataset(plan: str | None, out: Path | None, settings: tuple[str, ...], previ
             click.echo(line)
         click.echo(f"drew {preview} scenes into {sheet}")
         return
-    data = api.dataset(planned, folder, part=part)
+    data = api.dataset(planned, folder, part=part, dask=dask, workers=workers, threads=threads)
     found = data.status()
     click.echo(f"{data.folder}: {found}")
     if found.failed:

@@ -96,10 +96,10 @@ def make_all(data: DataSet, numbers: Iterable[int], progress: Progress = silent,
                     raise
                 data.note_failure(number, error)
                 if last:
-                    outcome.failed[number] = _in_a_line(error)
+                    outcome.failed[number] = in_a_line(error)
                 else:
                     again.append(number)
-                    tell(f"sequence {number} failed and gets a second try: {_in_a_line(error)}")
+                    tell(f"sequence {number} failed and gets a second try: {in_a_line(error)}")
             progress(len(outcome.made), len(numbers), what)
         waiting = again
     return outcome
@@ -128,6 +128,7 @@ def _is_of_the_disk(error: BaseException) -> bool:
     return isinstance(cause, OSError) and cause.errno in _OF_THE_DISK
 
 
-def _in_a_line(error: BaseException) -> str:
+def in_a_line(error: BaseException) -> str:
+    """What went wrong, for a list."""
     text = str(error) if isinstance(error, (InputError, ValueError)) else repr(error)
     return " ".join(text.split())[:300]

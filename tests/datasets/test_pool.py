@@ -1,0 +1,80 @@
+"""A data set made by processes that are killed is that of a single process, to the bit."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+
+import pytest
+
+import onespp
+from onespp.api.caller import Caller, calling
+from onespp.datasets import pool
+from onespp.datasets.folder import DataSet
+from onespp.datasets.making import make_all
+from onespp.datasets.plan import read_plan
+from onespp.render.errors import InputError
+from tests.datasets.test_making import files
+
+SMALL = {"sequences": 4, "frames": 2, "size": (16, 24), "reference_spp": 16}
+
+
+def test_without_dask_it_is_said_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match="pip install 'onespp\\[dask\\]'"):
+        onespp.dataset("simple", tmp_path / "d", dask="local", **SMALL)
+
+
+def test_a_scheduler_that_is_not_there_is_told(monkeypatch, tmp_path):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(pool, "_SECONDS_TO_CONNECT", 0.2)
+    with pytest.raises(InputError, match="no Dask scheduler at tcp://127.0.0.1:9"):
+        onespp.dataset("simple", tmp_path / "d", dask="tcp://127.0.0.1:9", **SMALL)
+
+
+@pytest.mark.slow
+def test_workers_that_are_killed_lose_nothing(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    onespp.dataset("simple", tmp_path / "one", **SMALL)
+    killed = []
+
+    def kill_workers(client, folder) -> None:
+        """Each time that a frame has come, one of the workers that make something."""
+        while len(killed) < 3:
+            busy = [name for name, tasks in client.processing().items() if tasks]
+            if busy and len(list(folder.rglob("frames/*.exr"))) > len(killed):
+                process = client.run(os.getpid, workers=busy[:1])[busy[0]]
+                os.kill(process, signal.SIGKILL)
+                killed.append(process)
+            time.sleep(0.2)
+
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True,
+                                  dashboard_address=None) as cluster, \
+            distributed.Client(cluster) as client:
+        killer = threading.Thread(target=kill_workers, args=(client, tmp_path / "pool"), daemon=True)
+        killer.start()
+        data = onespp.dataset("simple", tmp_path / "pool", dask=cluster.scheduler_address,
+                              threads=1, **SMALL)
+        killer.join(60)
+    assert len(killed) == 3
+    assert data.status().left == 0
+    assert data.verify() == []
+    left = {name: text for name, text in files(data.folder).items() if not name.endswith(".lock")}
+    assert left == files(tmp_path / "one")
+
+
+@pytest.mark.slow
+def test_a_pool_here_lists_what_fails_twice(tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    data = DataSet.create(tmp_path / "d", read_plan("simple", {"sequences": 2, "frames": 1,
+                                                               "height": 8, "width": 8}), {})
+    data.place(0).parent.mkdir()
+    data.place(0).write_text("in the way")
+    told: list[str] = []
+    outcome = pool.make_by_pool(data, range(2), pool.LOCAL, 2, tell=told.append)
+    assert outcome.made == [1]
+    assert [*outcome.failed] == data.failed() == [0]
+    assert len(told) == 1
