@@ -22,7 +22,7 @@ from onespp.render.files.sequence import FrameSequence
 from .motion import Matrices
 
 REFERENCE, HALF = "reference", "reference-half"
-_MATRICES = ("camera_from_world", "screen_from_world", "world_from_object")
+MATRICES = ("camera_from_world", "screen_from_world", "world_from_object")
 
 
 @dataclass(frozen=True)
@@ -38,40 +38,48 @@ class Store:
         `REFERENCE` is the reference, `HALF` its first half minus itself.
         """
         if self.cache is not None:
-            return {name: self._mapped(number, k, name)[i] for name in names}
+            return {name: array[i] for name, array in self._mapped(number, k, names).items()}
         return _decoded(self.data.sequence(number, k), i, names)
 
     def matrices(self, number: int, i: int) -> Matrices:
         """Of frame i."""
         if self.cache is None:
             return Matrices(*self.data.sequence(number).read_matrices(i))
-        return Matrices(*(np.array(self._mapped(number, 0, name)[i]) for name in _MATRICES))
+        return Matrices(*(np.array(a[i]) for a in self._mapped(number, 0, MATRICES).values()))
 
-    def _mapped(self, number: int, k: int, name: str) -> np.ndarray:
+    def _mapped(self, number: int, k: int, names: Sequence[str]) -> dict[str, np.ndarray]:
         assert self.cache is not None
         made = self.data.made(number)
         if made is None:
             raise InputError(f"{self.data.place(number)} is not whole: run `onespp dataset` again")
-        path = self.cache / f"{made.digest[:24]}-{k}-{name}.npy"
-        if not path.exists():
-            array = self._whole(number, k, name)
-            with replacing(path) as temporary, open(temporary, "wb") as file:
+        paths = {name: self.cache / f"{made.digest[:24]}-{k}-{name}.npy" for name in names}
+        missing = [name for name, path in paths.items() if not path.exists()]
+        for name, array in (whole(self.data, number, k, missing).items() if missing else ()):
+            with replacing(paths[name]) as temporary, open(temporary, "wb") as file:
                 np.save(file, array, allow_pickle=False)
         try:
-            return np.load(path, mmap_mode="r", allow_pickle=False)
+            return {name: np.load(path, mmap_mode="r", allow_pickle=False)
+                    for name, path in paths.items()}
         except (OSError, ValueError) as error:
-            raise InputError(f"{path} is damaged ({error}): delete it") from error
+            raise InputError(f"a file of the cache {self.cache} is damaged ({error}): delete it"
+                             ) from error
 
-    def _whole(self, number: int, k: int, name: str) -> np.ndarray:
-        """All frames of a channel, or of the matrices, in the type that is stored."""
-        sequence = self.data.sequence(number, k)
-        if name in _MATRICES:
-            at = _MATRICES.index(name)
-            return np.stack([sequence.read_matrices(i)[at] for i in sequence.frames])
-        found = np.stack([_decoded(sequence, i, [name])[name] for i in sequence.frames])
+
+def whole(data: DataSet, number: int, k: int, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """All frames of channels, or of `MATRICES`, of a render, in the types that files have."""
+    sequence = data.sequence(number, k)
+    found: dict[str, np.ndarray] = {}
+    if set(names) & {*MATRICES}:
+        parts = zip(*(sequence.read_matrices(i) for i in sequence.frames))
+        found = {name: np.stack(part) for name, part in zip(MATRICES, parts) if name in names}
+    images = [name for name in names if name not in MATRICES]
+    frames = [_decoded(sequence, i, images) for i in sequence.frames] if images else []
+    for name in images:
+        array = np.stack([frame[name] for frame in frames])
         stored = name in sequence.manifest.channels and CHANNELS[name].is_half(
             sequence.manifest.half)
-        return found.astype(np.float16) if stored or name == HALF else found
+        found[name] = array.astype(np.float16) if stored or name == HALF else array
+    return found
 
 
 def _decoded(sequence: FrameSequence, i: int, names: Sequence[str]) -> dict[str, np.ndarray]:

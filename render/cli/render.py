@@ -13,6 +13,7 @@ from onespp.render.files.sequence import FrameSequence
 
 from .arguments import parse_settings, parse_size
 from .options import render_options, use
+from .terminal import progress
 
 
 @click.command()
@@ -41,20 +42,33 @@ def render_to(name: str, out: Path | None, *, frames: str | None = None, size: s
                       size=None if size is None else parse_size(size), **options)
 
 
-FORMATS = click.option("--format", "layout", type=click.Choice(["games202"]), default="games202",
-                       show_default=True, help="The other layout.")
+DATA_SET_FORMATS = ("zarr", "webdataset")
 
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
-              help="Folder for the files; default FOLDER/games202.")
-@FORMATS
+              help="Folder for the files; default FOLDER/games202, of a data set FOLDER-FORMAT.")
+@click.option("--format", "layout", type=click.Choice(["games202", *DATA_SET_FORMATS]),
+              default="games202", show_default=True,
+              help="The other layout; of a data set zarr or webdataset.")
 def export(folder: Path, out: Path | None, layout: str) -> None:
-    """Write the frames of the sequence in FOLDER in another layout."""
+    """Write the frames of the sequence, or of the data set, in FOLDER in another layout."""
+    if layout in DATA_SET_FORMATS:
+        _export_data_set(folder, out or folder.with_name(f"{folder.name}-{layout}"), layout)
+        return
     from onespp.render.games202.convert import export_games202
 
     sequence = FrameSequence.open(folder)
     out = out or folder / layout
     export_games202(sequence, out)
     click.echo(f"exported {len(sequence.frames)} frames to {out}")
+
+
+def _export_data_set(folder: Path, out: Path, layout: str) -> None:
+    from onespp.clips.export import export as export_data_set
+    from onespp.datasets.folder import DataSet
+
+    with progress() as report:
+        count = export_data_set(DataSet.open(folder), layout, out, report)
+    click.echo(f"exported {count} renders of sequences to {out}")

@@ -11,10 +11,8 @@ import time
 import pytest
 
 import onespp
-from onespp.api.caller import Caller, calling
 from onespp.datasets import pool
 from onespp.datasets.folder import DataSet
-from onespp.datasets.making import make_all
 from onespp.datasets.plan import read_plan
 from onespp.render.errors import InputError
 from tests.datasets.test_making import files
@@ -31,7 +29,7 @@ def test_without_dask_it_is_said_what_to_install(monkeypatch, tmp_path):
 def test_a_scheduler_that_is_not_there_is_told(monkeypatch, tmp_path):
     pytest.importorskip("distributed")
     monkeypatch.setattr(pool, "_SECONDS_TO_CONNECT", 0.2)
-    with pytest.raises(InputError, match="no Dask scheduler at tcp://127.0.0.1:9"):
+    with pytest.raises(InputError, match=r"no Dask scheduler at tcp://127\.0\.0\.1:9"):
         onespp.dataset("simple", tmp_path / "d", dask="tcp://127.0.0.1:9", **SMALL)
 
 
@@ -54,7 +52,8 @@ def test_workers_that_are_killed_lose_nothing(tmp_path):
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True,
                                   dashboard_address=None) as cluster, \
             distributed.Client(cluster) as client:
-        killer = threading.Thread(target=kill_workers, args=(client, tmp_path / "pool"), daemon=True)
+        killer = threading.Thread(target=kill_workers, args=(client, tmp_path / "pool"),
+                                  daemon=True)
         killer.start()
         data = onespp.dataset("simple", tmp_path / "pool", dask=cluster.scheduler_address,
                               threads=1, **SMALL)
