@@ -225,6 +225,11 @@ def library() -> str:
     return "\n\n".join(_function_section(name, f) for name, f in functions.items())
 
 
+def clips() -> str:
+    """The reader of data sets, as its docstring has it."""
+    return _function_section("Clips", onespp.Clips)
+
+
 def _function(name: str) -> Any:
     found = getattr(onespp, name)  # packages that are functions, too
     return onespp._public(name) if inspect.ismodule(found) else found
@@ -269,7 +274,8 @@ PARTS: dict[str, Callable[[], str]] = {
     "architecture": architecture, "rooms": lambda: rooms_table(rooms()),
     "method-list": method_list, "methods": methods, "shared": shared, "peers": peers,
     "channels": channels, "metrics": metrics, "causes": causes, "histories": histories,
-    "library": library, "scenes": scenes, "hard-scenes": hard_scenes, "commands": commands,
+    "library": library, "clips": clips, "scenes": scenes, "hard-scenes": hard_scenes,
+    "commands": commands,
 }
 
 

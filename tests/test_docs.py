@@ -304,7 +304,8 @@ def check_command(words: list[str]) -> None:
     if program == "onespp" and rest:
         command, rest = find(rest)
         parse(command, rest)
-        check_settings(rest)
+        if command.name != "dataset":  # those are of a plan
+            check_settings(rest)
     elif program == "make":
         targets = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.M)
         assert {w for w in rest if "=" not in w} <= set(targets), words

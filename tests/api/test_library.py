@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 import onespp
-from onespp.api import caller, denoising, rendering, scoring
+from onespp.api import caller, datasets, denoising, rendering, scoring
 from onespp.api.caller import Line
+from onespp.clips import clips as clips_module
 from onespp.denoise.catalog import METHODS, PEERS, build, parameters
 from onespp.denoise.methods.outliers import RemoveOutliers
 from onespp.render import frame as frame_module
@@ -74,7 +75,7 @@ def test_every_public_name_is_there_and_documented():
         _ = onespp.rendr  # type: ignore[attr-defined]
 
 
-EXAMPLES = (rendering, denoising, scoring, caller, frame_module)
+EXAMPLES = (rendering, denoising, scoring, datasets, caller, frame_module, clips_module)
 
 
 @pytest.mark.parametrize("module", EXAMPLES, ids=lambda m: m.__name__)
@@ -82,7 +83,7 @@ def test_examples_run(module: ModuleType):
     assert doctest.testmod(module, raise_on_error=False).failed == 0
 
 
-PUBLIC = [f for m in (rendering, denoising, scoring) for name, f in vars(m).items()
+PUBLIC = [f for m in (rendering, denoising, scoring, datasets) for name, f in vars(m).items()
           if name in onespp.__all__ and f.__module__ == m.__name__]
 
 

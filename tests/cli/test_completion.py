@@ -13,6 +13,7 @@ import pytest
 
 from onespp.cli import app
 from onespp.cli.completion import SHELLS, WORDS
+from onespp.datasets.plan import PRESETS
 from onespp.denoise.catalog import METHODS, PEERS, build, parameters
 from onespp.render.channels import OFFERED
 from onespp.scenes.catalog import GENERATED, SCENES
@@ -23,7 +24,9 @@ KINDS = {"method": "method", "methods": "method", "peer": "method", "settings": 
          "scene": "scene", "channels": "channel", "device": "device", "folder": "sequence",
          "folders": "sequence", "seeds": "sequence", "truth_folder": "sequence", "out": "file",
          "json_to": "file"}
-SPECIAL = {("tune", "names"): "parameter", ("hard", "names"): "hard", ("import", "folder"): "dir"}
+SPECIAL = {("tune", "names"): "parameter", ("hard", "names"): "hard", ("import", "folder"): "dir",
+           ("dataset", "plan"): [*PRESETS], ("dataset", "settings"): "",
+           ("dataset", "verify"): "dir"}
 
 
 def kind(command: str, parameter: click.Parameter) -> str | list[str]:
@@ -81,7 +84,7 @@ def asked(line: str, cwd=None) -> list[str]:
     ("onespp tune x --method svgf --parameter alpha_", ["alpha_moments"]),
     ("onespp render box --sampler z", ["zsobol"]),
     ("onespp bench --device cu", ["cuda"]),
-    ("onespp completion f", ["fish"])])
+    ("onespp dataset ro", ["rooms"]), ("onespp completion f", ["fish"])])
 def test_a_word_is_completed(line, expected):
     found = asked(line)
     if expected == ["color_box="]:

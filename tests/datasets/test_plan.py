@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
 from onespp.datasets.plan import PRESETS, changed_plan, read_plan, value_of
 from onespp.render.errors import InputError
+from onespp.scenes.drawn.choices import Choices
 from onespp.scenes.drawn.draw import draw
 from onespp.scenes.fingerprint import fingerprint
 
@@ -53,6 +56,17 @@ def test_a_file_is_read_and_changed(tmp_path):
     assert (plan.reference_spp, plan.reference_error) == (None, 0.1)
     assert (plan.height, plan.draw.things, plan.draw.speed) == (12, (2, 3), (1, 1))
     assert value_of("draw.lights=['sun']") == ("draw.lights", ["sun"])
+
+
+def test_the_plan_of_the_documentation_can_be_used(tmp_path):
+    page = (Path(__file__).parents[2] / "docs/datasets.md").read_text("utf-8")
+    text = page.split("```toml\n")[1].split("```")[0]
+    (tmp_path / "mine.toml").write_text(text)
+    plan = read_plan(tmp_path / "mine.toml")
+    assert plan.held_out.families == ("columns",)
+    shown = dataclasses.asdict(plan.draw) | {"things": None, "speed": None, "exposure": None}
+    assert shown == dataclasses.asdict(Choices()) | {"things": None, "speed": None,
+                                                     "exposure": None}
 
 
 @pytest.mark.parametrize(("text", "words"), [
