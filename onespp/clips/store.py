@@ -8,7 +8,8 @@ anew nothing old is read.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -22,15 +23,21 @@ from onespp.render.files.sequence import FrameSequence
 from .motion import Matrices
 
 REFERENCE, HALF = "reference", "reference-half"
+_MOST_OPEN = 4096
 MATRICES = ("camera_from_world", "screen_from_world", "world_from_object")
 
 
 @dataclass(frozen=True)
 class Store:
-    """Where frames come from. cache: a folder for memory maps, or None."""
+    """Where frames come from.
+
+    Attributes:
+        cache: a folder for memory maps, or None. digests: of sequences that were read.
+    """
 
     data: DataSet
     cache: Path | None = None
+    digests: dict[int, str] = field(default_factory=dict)
 
     def images(self, number: int, k: int, i: int, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Channels of frame i of the k-th render of a sequence, (h, w) or (h, w, c), whole.
@@ -39,35 +46,52 @@ class Store:
         """
         if self.cache is not None:
             return {name: array[i] for name, array in self._mapped(number, k, names).items()}
-        return _decoded(self.data.sequence(number, k), i, names)
+        return _decoded(_sequence(self.data, number, k), i, names)
 
     def matrices(self, number: int, i: int) -> Matrices:
         """Of frame i."""
         if self.cache is None:
-            return Matrices(*self.data.sequence(number).read_matrices(i))
+            return Matrices(*_sequence(self.data, number, 0).read_matrices(i))
         return Matrices(*(np.array(a[i]) for a in self._mapped(number, 0, MATRICES).values()))
 
     def _mapped(self, number: int, k: int, names: Sequence[str]) -> dict[str, np.ndarray]:
         assert self.cache is not None
-        made = self.data.made(number)
-        if made is None:
-            raise InputError(f"{self.data.place(number)} is not whole: run `onespp dataset` again")
-        paths = {name: self.cache / f"{made.digest[:24]}-{k}-{name}.npy" for name in names}
+        if number not in self.digests:
+            made = self.data.made(number)
+            if made is None:
+                raise InputError(f"{self.data.place(number)} is not whole: run `onespp dataset` "
+                                 "again")
+            self.digests[number] = made.digest[:24]
+        paths = {name: self.cache / f"{self.digests[number]}-{k}-{name}.npy" for name in names}
         missing = [name for name, path in paths.items() if not path.exists()]
         for name, array in (whole(self.data, number, k, missing).items() if missing else ()):
             with replacing(paths[name]) as temporary, open(temporary, "wb") as file:
                 np.save(file, array, allow_pickle=False)
         try:
-            return {name: np.load(path, mmap_mode="r", allow_pickle=False)
-                    for name, path in paths.items()}
+            return {name: _opened(path) for name, path in paths.items()}
         except (OSError, ValueError) as error:
             raise InputError(f"a file of the cache {self.cache} is damaged ({error}): delete it"
                              ) from error
 
 
+@lru_cache(_MOST_OPEN)
+def _opened(path: Path) -> np.ndarray:
+    """A memory map: one a process, for it cannot be sent to another one."""
+    return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
+
+
+def _sequence(data: DataSet, number: int, k: int) -> FrameSequence:
+    return _opened_sequence(data.place(number) / f"seed{k}")
+
+
+@lru_cache(_MOST_OPEN)
+def _opened_sequence(folder: Path) -> FrameSequence:
+    return FrameSequence.open(folder)
+
+
 def whole(data: DataSet, number: int, k: int, names: Sequence[str]) -> dict[str, np.ndarray]:
     """All frames of channels, or of `MATRICES`, of a render, in the types that files have."""
-    sequence = data.sequence(number, k)
+    sequence = _sequence(data, number, k)
     found: dict[str, np.ndarray] = {}
     if set(names) & {*MATRICES}:
         parts = zip(*(sequence.read_matrices(i) for i in sequence.frames))
