@@ -28,7 +28,7 @@ ROOMS = (
     "onespp.denoise.run", "onespp.denoise.score",
     "onespp.denoise.catalog", "onespp.denoise.peers",
     "onespp.denoise.methods.antialiasing", "onespp.denoise.methods.filtered_innovation",
-    "onespp.denoise.methods.unguided",
+    "onespp.denoise.methods.regression", "onespp.denoise.methods.unguided",
     "onespp.denoise.methods",
     "onespp.denoise.filters", "onespp.denoise.history", "onespp.denoise.inputs",
     "onespp.denoise.oracles", "onespp.denoise.jit", "onespp.denoise.metrics",

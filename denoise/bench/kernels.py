@@ -34,6 +34,7 @@ from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
 from onespp.denoise.oracles import filtered_innovation as innovation_oracle
 from onespp.denoise.oracles import filters as oracles
 from onespp.denoise.oracles import svgf as svgf_oracles
+from onespp.denoise.oracles.bmfr import bmfr
 from onespp.denoise.oracles.taa import taa
 from onespp.denoise.peers.oidn import AVAILABLE, Oidn
 from onespp.render.frame import Frame
@@ -110,6 +111,7 @@ KERNELS = {
         *_both(_ATROUS, _TEMPORAL)),
     "svgf": Kernel(lambda *frames: svgf_oracles.svgf(list(frames)), textured=True),
     "asvgf": Kernel(lambda *frames: svgf_oracles.asvgf(list(frames)), textured=True),
+    "bmfr": Kernel(lambda *frames: bmfr(frames), textured=True),
     "onespp": Kernel(lambda *frames: innovation_oracle.run(list(frames), FilteredInnovation()),
                      textured=True),
     "onespp-taa": Kernel(lambda *frames: taa(frames, _innovations(*frames)), textured=True),

@@ -143,21 +143,24 @@ class Stencil:
         silently gathers word by word, and a step records again when the alignment changes."""
         return aligned(self.Float, np.asarray(values, np.float32))
 
-    def pack(self, words: Sequence[Float]) -> Float:
+    def pack(self, words: Sequence[Float], lanes: int | None = None) -> Float:
         """A few numbers a lane, side by side, for packed gathers. Traced, not evaluated."""
-        packed = dr.empty(self.Float, self.lanes * len(words))
-        dr.scatter(packed, self.ArrayXf(words), dr.arange(self.UInt, self.lanes))
+        lanes = lanes or self.lanes
+        packed = dr.empty(self.Float, lanes * len(words))
+        dr.scatter(packed, self.ArrayXf(words), dr.arange(self.UInt, lanes))
         return packed
 
-    def unpack(self, packed: Float, index: Any, size: int, count: int | None = None) -> list[Float]:
+    def unpack(self, packed: Float, index: Any, size: int, count: int | None = None,
+               lanes: int | None = None) -> list[Float]:
         """The first `count` words (default: all) of the records of `size` words at an index.
 
-        `size` is a multiple of 8, which is what one gather brings.
+        `size` is a multiple of 8, which is what one gather brings. `lanes`, here as in `pack`: how
+        many there are, where they are not the image's.
         """
-        count, words = count or size, []
+        count, lanes, words = count or size, lanes or self.lanes, []
         for chunk in range(-(-count // _GATHERED)):
             at = self.UInt(index) * (size // _GATHERED) + chunk
-            words += list(dr.gather(self.ArrayXf, packed, at, shape=(_GATHERED, self.lanes)))
+            words += list(dr.gather(self.ArrayXf, packed, at, shape=(_GATHERED, lanes)))
         return words[:count]
 
     def rows_around(self, values: Any, margin: int) -> Taps[list[Float]]:

@@ -202,7 +202,7 @@ def small(name: str, **settings: object) -> dict[str, str]:
     known = parameters(METHODS[name]())
     levels = settings.get("levels", LEVELS)
     wanted = {"radius": RADIUS, "levels": levels, "output_levels": levels,
-              "sharp_output_levels": levels, "demodulate": False, **settings}
+              "sharp_output_levels": levels, "block_size": 8, "demodulate": False, **settings}
     return {k: str(v) for k, v in wanted.items() if k in known}
 
 

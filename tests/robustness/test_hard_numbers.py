@@ -214,4 +214,4 @@ def test_filling_in_float64_agrees_with_the_kernels_repair():
 def test_the_settings_here_are_small(name):
     known, chosen = parameters(METHODS[name]()), small(name)
     assert set(chosen) == set(known) & {"radius", "levels", "output_levels", "sharp_output_levels",
-                                        "demodulate"}
+                                        "block_size", "demodulate"}

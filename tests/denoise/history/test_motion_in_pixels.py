@@ -23,8 +23,8 @@ MOVES = {
     "board": {"board": translation(0.5, -0.3, 0.05) @ turn(0.1)},
     "both": {"camera": turn(-0.03), "board": translation(-0.4, 0, 0)},
 }
-TEMPORAL = ("temporal", "assignment", "assignment-atrous", "svgf", "asvgf", "onespp",
-            "temporal-oidn", "temporal-oidn-split")
+TEMPORAL = ("temporal", "assignment", "assignment-atrous", "svgf", "asvgf", "bmfr",
+            "onespp", "temporal-oidn", "temporal-oidn-split")
 
 
 def pair(move: str) -> tuple[Frame, Frame]:

@@ -19,13 +19,15 @@ SMALL = {"gaussian": {"radius": "4"}, "gaussian-separable": {"radius": "4"},
          "assignment": {"radius": "4"}, "atrous": {"levels": "3"},
          "assignment-atrous": {"levels": "3"}, "temporal": {}, "svgf": {"levels": "3"},
          "asvgf": {"levels": "3"},
+         "bmfr": {"block_size": "8"},
          "taa": {},
          "onespp": {"innovation_levels": "3", "output_levels": "3", "sharp_output_levels": "2"}}
 SMALL["onespp-taa"] = SMALL["onespp"]
 
-# Colours alone do not tell objects apart: the first three leak, and are there to show it.
+# Colours alone do not tell objects apart: the first three leak, and are there to show it. So does
+# a fit whose features tell objects apart only as far as a sum of them can.
 # Anti-aliasing is to make a pixel of an edge the mean of both sides.
-LEAKING = {"gaussian", "gaussian-separable", "bilateral-color", "taa", "onespp-taa"}
+LEAKING = {"gaussian", "gaussian-separable", "bilateral-color", "bmfr", "taa", "onespp-taa"}
 
 each_method = pytest.mark.parametrize("name", METHODS)
 SIZES = [(1, 1), (1, 7), (7, 1), (3, 5), (13, 17), (23, 2)]
@@ -150,7 +152,7 @@ def test_a_still_scene_has_less_noise_in_its_result(name):
 
 
 @pytest.mark.parametrize("name", ["temporal", "assignment", "assignment-atrous", "svgf",
-                                  "asvgf"])
+                                  "asvgf", "bmfr"])
 def test_history_makes_a_still_scene_flicker_less(name):
     clean = make_frame(24, 24, wall_end=1e9)
     method = build(name, SMALL[name])

@@ -1,0 +1,1 @@
+"""Filters that fit feature buffers to noise, instead of averaging neighbours."""
