@@ -22,7 +22,7 @@ def bmfr(frames: Sequence[Frame], alpha: float = 0.2, alpha_fitted: float = 0.1,
         albedo, emission = np.ones((*shape, 3)), np.zeros((*shape, 3))
         is_fitted = frame["id"] >= 0
         if demodulate and "albedo" in frame:
-            dark = (frame["albedo"] < 0.01).all(-1)
+            dark = np.asarray((frame["albedo"] < 0.01).all(-1))
             albedo = np.where(dark[..., None], 1, np.maximum(frame["albedo"], 0.01))
             if "emission" in frame:
                 emission = frame["emission"].astype(np.float64)
@@ -39,8 +39,7 @@ def bmfr(frames: Sequence[Frame], alpha: float = 0.2, alpha_fitted: float = 0.1,
             return np.where(found, weight * now + (1 - weight) * before, now)
 
         mixed = blended(light, old[..., 1:4], alpha)
-        shift = [int(block_size * (i % 16 * step % 1))
-                 for step in (0.7548776662466927, 0.5698402909980532)]
+        shift = [int(block_size * ((step * i) % 16) / 16) for step in (7, 3)]
         fitted = fit(frame, mixed, is_fitted, block_size, shift, feature_noise)
         result = blended(np.where(is_fitted[..., None], fitted, mixed), old[..., 4:], alpha_fitted)
         records, previous = np.concatenate([length, mixed, result], -1), frame
@@ -52,7 +51,9 @@ def fit(frame: Frame, light: np.ndarray, is_fitted: np.ndarray, size: int, shift
         feature_noise: float) -> np.ndarray:
     """(h, w, 3) of each pixel, its block's fit."""
     h, w = is_fitted.shape
-    images = {"n": frame["normal"], "x": frame["position"], "light": light, "there": is_fitted}
+    eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
+    images = {"n": frame["normal"], "x": frame["position"] - eye, "light": light,
+              "there": is_fitted}
     # Blocks from row -shift on; what is outside is mirrored, as often as needed.
     rows, columns = (_mirrored(np.arange(-s, n + 2 * size), n) for s, n in zip(shift, (h, w)))
     wide = {k: np.asarray(v, np.float64)[np.ix_(rows, columns)] for k, v in images.items()}
@@ -71,8 +72,8 @@ def fit(frame: Frame, light: np.ndarray, is_fitted: np.ndarray, size: int, shift
 
 def _fitted(n: np.ndarray, x: np.ndarray, light: np.ndarray, feature_noise: float) -> np.ndarray:
     """(pixels, 3) the damped fit, of pixels of one block."""
-    extent = np.ptp(x, 0)
-    t = (x - (x.min(0) + x.max(0)) / 2) / np.where(extent > 0, extent, 1)
+    extent = np.maximum(np.ptp(x, 0), 1e-3 * np.abs(x).max())
+    t = (x - (x.min(0) + x.max(0)) / 2) / extent
     features = np.concatenate([n, t, 4 * t**2], 1)
     features, mean = features - features.mean(0), light.mean(0)
     count = len(x)

@@ -21,14 +21,13 @@ Departures:
   (`fit.py`): the same damping, without a random number. Its switch is `feature_noise`.
 - Squares are of positions from the middle of the block, not of the world's origin: the same sums,
   but for the damping, and they keep their digits far away from it. Positions are scaled by their
-  extent in the block, as in the paper.
+  extent in the block, as in the paper, or by a thousandth of their distance if that is more.
 - The fit is held between the least and greatest A of its block: outliers of a fit, negative light
   among them, are none of the light that came.
 - A pixel without a surface, and a lamp that reflects nothing, is not fitted and keeps A. Others of
   a block are fitted together, whatever object they are of: at an edge that neither normals nor
   positions tell, light leaks.
-- Shifts are 16 of a low-discrepancy sequence, not the published table. Light outside the image is
-  the image mirrored.
+- Shifts are the 16 points of a lattice, not the published table.
 - Taps of the history are tested by object too, and against the tangent plane (`reprojection.py`).
 - The paper's temporal anti-aliasing at the end is left out: scores compare radiance at the pixels'
   centres. `taa` is that step on its own.
@@ -65,7 +64,7 @@ from .blocks import Blocks, Shift
 from .fit import Sample, fitted_light
 
 SHIFTS = 16
-_STEP = (0.7548776662466927, 0.5698402909980532)  # of the R2 sequence: rows, columns
+_STEP = (7, 3)    # from one shift to the next, sixteenths of a block: rows, columns
 _LONGEST = 255.0  # frames: a history's length is a byte in the paper
 _VALUES = 1 + 3 + 3
 
@@ -78,7 +77,7 @@ class Bmfr(OnLanes["BmfrState"]):
         alpha: least weight of the current frame in what is fitted [1, 1e-6 to 1].
         alpha_fitted: least weight of the current frame's fit in the result [1, 1e-6 to 1].
         block_size: side of a block [pixels, 4 to 64]; each value compiles a kernel.
-        feature_noise: largest noise on features that the fit is damped for [1, 1e-3 to 1].
+        feature_noise: largest noise on features that the fit is damped for [1, 0.003 to 1].
         min_cosine: least cosine between a history tap's normal and the expected one, see
             `reprojection.py` [1, -1 to 1].
         plane_tolerance: largest distance of a history tap from the expected tangent plane
@@ -104,7 +103,7 @@ class Bmfr(OnLanes["BmfrState"]):
         for name in ("alpha", "alpha_fitted"):
             check_range(self, name, 1e-6, 1.0)
         check_whole(self, "block_size", 64, 4)
-        check_range(self, "feature_noise", 1e-3, 1.0)
+        check_range(self, "feature_noise", 0.003, 1.0)
         check_range(self, "min_cosine", -1.0, 1.0)
         check_positive(self, "plane_tolerance")
 
@@ -177,8 +176,9 @@ class BmfrState:
 
 
 def shift_of(frame: int, size: int, stencil: Stencil) -> Shift:
-    """Of the tiling of a frame, counted from the sequence's first: 16 in turns."""
-    return Shift(*[dr.opaque(stencil.Int, int(size * (frame % SHIFTS * step % 1)))
+    """Of the tiling of a frame, counted from the sequence's first: 16 in turns, no two in one row
+    or column."""
+    return Shift(*[dr.opaque(stencil.Int, step * frame % SHIFTS * size // SHIFTS)
                    for step in _STEP])
 
 

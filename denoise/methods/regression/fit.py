@@ -1,8 +1,9 @@
-"""The light of a block as the sum of feature buffers that is nearest to it, and its value in pixels.
+"""The light of a block as the nearest sum of feature buffers, and its value in pixels.
 
 Symbols: n normal, X position along the world's axes, relative to the camera, L light; for a block,
 middle m and extent e of X (greatest less least), and middle of n, over the pixels that are fitted;
-t = (X - m) / e, 0 where e is 0.
+t = (X - m) / max(e, r), r a thousandth of the largest component of X: a wall along an axis has an
+extent of rounding errors, which are no feature.
 
     features of a pixel   f = (n - middle,  t,  4 t^2 - 1/2)      nine, none larger than 1
     fit                   L ~ a + b f,  b least squares with sigma^2 (b . b) a pixel added
@@ -23,6 +24,7 @@ from the block's least on, and the fit is held between its least and greatest.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import NamedTuple
 
 import drjit as dr
@@ -35,6 +37,7 @@ from .blocks import Blocks, Shift
 
 FEATURES = 9
 _FAR = 1e30                # extremes of no pixels
+_LEAST_EXTENT = 1e-3       # r, of the largest component
 _RECORD, _USED = 16, 10    # words of a pixel's record, and how many it holds
 _FIT, _FIT_USED = 48, 45   # the same of a block's
 _PAIRS = [(i, j) for i in range(FEATURES) for j in range(i + 1)]
@@ -49,11 +52,12 @@ class Sample(NamedTuple):
 
 
 class _Frame(NamedTuple):
-    """What a block's features are measured from: middle of n, m, 1 / e; least and greatest L."""
+    """What a block's features are measured from: middle of n, m, 1 / max(e, r); least and greatest
+    L."""
 
     normal: list[Float]
     middle: list[Float]
-    inverse_extent: list[Float]
+    scale: list[Float]
     least: list[Float]
     greatest: list[Float]
 
@@ -134,9 +138,11 @@ def _frame_of(extremes: list[Float]) -> _Frame:
     """Of the extremes of n, X and L. All zeros where no pixel is fitted, but for the light."""
     least, greatest = extremes[:9], extremes[9:]
     middle = [0.5 * (a + b) for a, b in zip(least, greatest)]
-    extent = [b - a for a, b in zip(least[3:6], greatest[3:6])]
-    inverse = [dr.select(e > 0, 1 / dr.select(e > 0, e, 1), 0) for e in extent]
-    return _Frame(middle[:3], middle[3:6], inverse, least[6:], greatest[6:])
+    near, far = least[3:6], greatest[3:6]
+    largest = reduce(dr.maximum, map(dr.abs, [*near, *far]))
+    extent = [dr.maximum(b - a, _LEAST_EXTENT * largest) for a, b in zip(near, far)]
+    scale = [dr.select(e > 0, 1 / dr.select(e > 0, e, 1), 0) for e in extent]
+    return _Frame(middle[:3], middle[3:6], scale, least[6:], greatest[6:])
 
 
 def _frame(words: Sequence[Float]) -> _Frame:
@@ -146,7 +152,7 @@ def _frame(words: Sequence[Float]) -> _Frame:
 
 def _features(sample: Sample, frame: _Frame) -> list[Float]:
     normal = [n - m for n, m in zip(sample.normal, frame.normal)]
-    t = [(x - m) * e for x, m, e in zip(sample.position, frame.middle, frame.inverse_extent)]
+    t = [(x - m) * e for x, m, e in zip(sample.position, frame.middle, frame.scale)]
     return [*normal, *t, *(dr.fma(4 * x, x, -0.5) for x in t)]
 
 
