@@ -32,6 +32,7 @@ from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
 from onespp.denoise.methods.outliers import RemoveOutliers, WithoutOutliers
 from onespp.denoise.methods.parameters import renamed_parameters, with_present_names
 from onespp.denoise.methods.regression.bmfr import Bmfr
+from onespp.denoise.methods.reliable_motion.trmv import Trmv
 from onespp.denoise.methods.separable import BilateralSeparable
 from onespp.denoise.methods.svgf import Svgf
 from onespp.denoise.methods.temporal import Temporal
@@ -92,6 +93,7 @@ METHODS: Mapping[str, type] = MappingProxyType({
     "assignment": Assignment,
     "assignment-atrous": AssignmentAtrous,
     "svgf": Svgf,
+    "trmv": Trmv,
     "asvgf": Asvgf,
     "bmfr": Bmfr,
     "onespp": FilteredInnovation,

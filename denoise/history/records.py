@@ -17,7 +17,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import drjit as dr
 
 from onespp.denoise.inputs.surface import SurfaceSample
-from onespp.denoise.jit.arrays import Bool, Float, Vector3
+from onespp.denoise.jit.arrays import Bool, Float, UInt, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.masked import weighted_sums
 from onespp.denoise.jit.structure import arrays_of
@@ -66,6 +66,18 @@ class RecordState(Generic[PassesT]):
     passes: PassesT | None = None
 
 
+def surface_at(stencil: Stencil, records: Float, lane: UInt, words: int) -> SurfaceSample:
+    """The surface that records of so many words show in a pixel of the previous frame."""
+    return _surface_of(stencil.unpack(records, lane, words, _HEAD))
+
+
+def _surface_of(record: list[Float]) -> SurfaceSample:
+    head, nx, ny, depth = record[:_HEAD]
+    id_ = dr.floor(head)
+    nz = dr.sqrt(dr.maximum(dr.fma(-nx, nx, dr.fma(-ny, ny, 1)), 0))
+    return SurfaceSample(id_, Vector3(nx, ny, dr.select(head == id_, nz, -nz)), depth)
+
+
 class LookUp(NamedTuple):
     """Values of records, depth first as they were packed, and the mask of pixels that have some."""
 
@@ -92,10 +104,7 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
                      & (row >= 0) & (row < stencil.height))
         lane = dr.select(on_screen, row * stencil.stride + column, 0)
         record = stencil.unpack(records, lane, words, _HEAD + count)
-        head, nx, ny, depth = record[:_HEAD]
-        id_ = dr.floor(head)
-        nz = dr.sqrt(dr.maximum(dr.fma(-nx, nx, dr.fma(-ny, ny, 1)), 0))
-        normal = Vector3(nx, ny, dr.select(head == id_, nz, -nz))
+        id_, normal, depth = _surface_of(record)
         center = Vector3(float_t(column) + 0.5, float_t(row) + 0.5, float_t(1))
         near = dr.abs(dr.fma(depth, dot(place.plane, center), -place.offset)) < place.nearness
         turned = dot(place.normal, normal) > min_cosine

@@ -33,7 +33,7 @@ from onespp.denoise.jit.masked import weighted_sums
 from onespp.denoise.jit.vector import dot, transform
 
 from .records import WORDS, look_up
-from .reprojection import Motion, ReprojectionTests, ScreenShift, locate
+from .reprojection import Motion, Place, ReprojectionTests, ScreenShift, locate
 
 SPREAD_LEVEL = 2  # of the smoothing by which motion spreads
 CHOICE_LEVELS = 5  # of the smoothing of squared innovations
@@ -78,7 +78,7 @@ def shadow_motion(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
         def seen(object_: Float, offset: Vector3) -> Vector3:
             """Where a point was as the surface saw it, from the surface."""
             point = Vector3(*[p + o for p, o in zip(position, offset)])
-            there = _moved(back, _moved(matrix(object_, 0), point))
+            there = moved(back, moved(matrix(object_, 0), point))
             return Vector3(*[q - p for p, q in zip(position, there)])
 
         y = seen(light_id, light)
@@ -100,7 +100,8 @@ def shadow_motion(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
     return ShadowMotion(moves, dx, dy)
 
 
-def _moved(matrix: list[Float], point: Vector3) -> Vector3:
+def moved(matrix: list[Float], point: Vector3) -> Vector3:
+    """A point by the first three rows of a 4x4 matrix."""
     return Vector3(*[dr.fma(matrix[r], point.x, dr.fma(matrix[r + 1], point.y, dr.fma(
         matrix[r + 2], point.z, matrix[r + 3]))) for r in (0, 4, 8)])
 
@@ -111,8 +112,21 @@ def look_up_shadow(stencil: Stencil, surface: SurfaceSample, plane: TangentPlane
     """Two values of the records where each pixel's shadow was.
 
     Args:
-        at: which. words: of a record.
-        plane: of the surface. motion: of `motion_between`. shadow: of `shadow_motion`, smoothed.
+        at: which. words: of a record. The others are those of `shadow_place`.
+    """
+    place, moves = shadow_place(stencil, surface, plane, motion, shadow, tests)
+    values, is_valid = look_up(stencil, place, records, at + 2, tests.min_cosine, active=moves,
+                               words=words)
+    return ShadowHistory(values[at], values[at + 1], moves & is_valid)
+
+
+def shadow_place(stencil: Stencil, surface: SurfaceSample, plane: TangentPlane, motion: Motion,
+                 shadow: ShadowMotion, tests: ReprojectionTests) -> tuple[Place, Bool]:
+    """Where each pixel's shadow was, and the mask of those whose shadow moves.
+
+    Args:
+        plane: of the surface; its `scale` is not used. motion: of `motion_between`.
+        shadow: of `shadow_motion`, smoothed.
     """
     moves = shadow.moves > MIN_SHARE
     norm = 1 / dr.select(moves, shadow.moves, 1)
@@ -120,7 +134,4 @@ def look_up_shadow(stencil: Stencil, surface: SurfaceSample, plane: TangentPlane
     inverse_depth = dr.fma(plane.dx, shift.dx, dr.fma(plane.dy, shift.dy, plane.inverse_depth))
     moves &= inverse_depth > 0
     there = surface._replace(depth=dr.select(moves, 1 / inverse_depth, surface.depth))
-    place = locate(stencil, there, motion, tests.plane_tolerance, shift)
-    values, is_valid = look_up(stencil, place, records, at + 2, tests.min_cosine, active=moves,
-                               words=words)
-    return ShadowHistory(values[at], values[at + 1], moves & is_valid)
+    return locate(stencil, there, motion, tests.plane_tolerance, shift), moves

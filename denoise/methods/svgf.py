@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -63,8 +63,10 @@ from .svgf_accumulation import (
     SHORT,
     Accumulated,
     AccumulationWeights,
+    Refine,
     accumulate,
     estimate_variances,
+    record_values,
     tabulate_moments,
 )
 
@@ -123,6 +125,7 @@ class Svgf(OnLanes["RecordState[Passes]"]):
 
     uses: ClassVar[tuple[str, ...]] = SIGNALS
     renamed: ClassVar[Mapping[str, str]] = HISTORY_RENAMED
+    refine: ClassVar[Refine | None] = None
 
     def __post_init__(self) -> None:
         check_whole(self, "levels", LARGEST_LEVELS)
@@ -144,23 +147,24 @@ class Svgf(OnLanes["RecordState[Passes]"]):
         """`color` is used where the frame is one signal."""
         stencil, sample = state.stencil, surface.sample
         motion = motion_between(state.previous or frame, frame, stencil)
-        light = self._demodulate(frame, color, stencil)
+        light = self.demodulate_light(frame, color, stencil)
         changes = self.shading_changes(frame, len(light.signals), state)
         geometry = read_geometry(stencil, surface, self.sigma_depth)
         weights = self._level_weights(stencil)
-        passes = self._passes(state, len(light.signals))
+        passes, records = self._passes(state, len(light.signals), len(changes))
         evaluate(light.signals, sample, geometry)
 
         passes.guides.store(geometry.guides)
         accumulated, window_table = passes.accumulate(
-            light.signals, sample, motion, state.records, geometry.guides, changes,
-            self._accumulation_weights(stencil, len(light.signals)), self._tests(stencil))
+            light.signals, sample, motion, records, geometry.guides, changes,
+            self._accumulation_weights(stencil, len(light.signals)), self._tests(stencil),
+            self.known(frame, surface, light, state))
         variances = passes.estimate_variances(accumulated, geometry, window_table,
                                               self._min_temporal_length(stencil),
                                               weights.normal_exponent)
         filtered = passes.filter_levels(accumulated, variances, geometry, weights)
         history = self._history(accumulated, filtered)
-        records = passes.pack(sample, history) if self.accumulate else state.records
+        records = passes.pack(sample, history) if self.accumulate else records
         return light.modulate(filtered.last_level), replace(
             state, passes=passes, records=records, previous=without_images(frame))
 
@@ -174,7 +178,12 @@ class Svgf(OnLanes["RecordState[Passes]"]):
         """alpha of each signal."""
         return [self.alpha] * count
 
-    def _demodulate(self, frame: Frame, color: Color, stencil: Stencil) -> Light:
+    def known(self, frame: Frame, surface: Surface, light: Light,
+              state: RecordState[Passes]) -> Any:
+        """What `refine` is told of a frame, evaluated; nothing here."""
+        return None
+
+    def demodulate_light(self, frame: Frame, color: Color, stencil: Stencil) -> Light:
         """The frame's light without texture, direct and indirect apart where it has them."""
         texture = read_texture(frame, stencil, self.demodulate)
         if not self.split or not all(name in frame for name in SIGNALS):
@@ -187,11 +196,14 @@ class Svgf(OnLanes["RecordState[Passes]"]):
                       for light in (direct, indirect) if light],
                      Texture(texture.albedo, emission))
 
-    def _passes(self, state: RecordState[Passes], count: int) -> Passes:
-        """Of `count` signals: made for the first frame, and where their number changes."""
+    def _passes(self, state: RecordState[Passes], count: int,
+                lengths: int) -> tuple[Passes, Float]:
+        """Of `count` signals, and records: made for the first frame, and where the number of
+        signals changes."""
         if state.passes is None or len(state.passes.filters) != count:
-            return Passes.make(state.stencil, count, self.levels, self.fallback)
-        return state.passes
+            return (Passes.make(state.stencil, count, self.levels, self.fallback, self.refine),
+                    no_history(state.stencil, record_values(count, max(lengths, 1))))
+        return state.passes, state.records
 
     def _accumulation_weights(self, stencil: Stencil, count: int) -> AccumulationWeights:
         return AccumulationWeights([stencil.opaque(a) for a in self.alphas(count)],
@@ -222,17 +234,29 @@ class Svgf(OnLanes["RecordState[Passes]"]):
 
 @dataclass(frozen=True)
 class Light:
-    """A frame's light as signals without texture, traced and not yet evaluated; the texture."""
+    """A frame's light as signals, traced and not yet evaluated.
+
+    Attributes:
+        texture: which they are without. has_specular: the last of them never had any.
+    """
 
     signals: list[LuminanceColor]
     texture: Texture
+    has_specular: bool = False
 
     def modulate(self, signals: Sequence[LuminanceColor]) -> Color:
         """The colour that filtered signals make."""
-        total, *others = [with_green(signal) for signal in signals]
-        for light in others:
-            total = Color(*[a + b for a, b in zip(total, light)])
-        return self.texture.modulate(total)
+        lights = [with_green(signal) for signal in signals]
+        bare = lights.pop() if self.has_specular else None
+        total = self.texture.modulate(_sum(lights))
+        return _sum([total, bare]) if bare else total
+
+
+def _sum(lights: list[Color]) -> Color:
+    total, *others = lights
+    for light in others:
+        total = Color(*[a + b for a, b in zip(total, light)])
+    return total
 
 
 class Blended(NamedTuple):
@@ -260,14 +284,15 @@ class Passes:
     pack: Step[..., Float]
 
     @staticmethod
-    def make(stencil: Stencil, count: int, levels: int, fallback: bool) -> Passes:
+    def make(stencil: Stencil, count: int, levels: int, fallback: bool,
+             refine: Refine | None) -> Passes:
         guides = stencil.planes(OUTSIDE)
 
         def blend(signals: list[LuminanceColor], surface: SurfaceSample, motion: Motion,
                   records: Float, guides: Guides, changes: list[Float],
-                  weights: AccumulationWeights, tests: ReprojectionTests) -> Blended:
-            accumulated = accumulate(stencil, fallback, signals, surface, motion, records, changes,
-                                     weights, tests)
+                  weights: AccumulationWeights, tests: ReprojectionTests, known: Any) -> Blended:
+            accumulated = accumulate(stencil, fallback, refine, signals, surface, motion, records,
+                                     changes, weights, tests, known)
             table = tabulate_moments(stencil, accumulated, guides)
             evaluate(accumulated, table)
             return Blended(accumulated, table)

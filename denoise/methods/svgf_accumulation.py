@@ -17,6 +17,7 @@ Schied et al. 2018; the power of 10 from Quake II RTX.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import reduce
 from operator import or_
 from typing import Any, NamedTuple
@@ -24,8 +25,8 @@ from typing import Any, NamedTuple
 import drjit as dr
 
 from onespp.denoise.filters.svgf_level import Geometry, Guides, geometry_exponent, guides_of
-from onespp.denoise.history.records import look_up
-from onespp.denoise.history.reprojection import Motion, ReprojectionTests, locate
+from onespp.denoise.history.records import LookUp, look_up, record_words
+from onespp.denoise.history.reprojection import Motion, Place, ReprojectionTests, locate
 from onespp.denoise.inputs.surface import SurfaceSample
 from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.color import LuminanceColor
@@ -69,12 +70,35 @@ class AccumulationWeights(NamedTuple):
     max_history_length: Float
 
 
-def accumulate(stencil: Stencil, fallback: bool, signals: list[LuminanceColor],
+class Sought(NamedTuple):
+    """What a history was looked up by."""
+
+    surface: SurfaceSample
+    motion: Motion
+    place: Place
+    records: Float
+    tests: ReprojectionTests
+
+
+Refine = Callable[[Stencil, Sought, LookUp, Any], LookUp]
+"""What a method makes of a history: what it was looked up by, what was found, and what the method
+knows beside it (a structure of arrays)."""
+
+
+def record_values(signals: int, lengths: int = 1) -> int:
+    """Values of a record."""
+    return lengths + (_COLOR + _MOMENTS) * signals
+
+
+def accumulate(stencil: Stencil, fallback: bool, refine: Refine | None,
+               signals: list[LuminanceColor],
                surface: SurfaceSample, motion: Motion, records: Float, changes: list[Float],
-               weights: AccumulationWeights, tests: ReprojectionTests) -> Accumulated:
+               weights: AccumulationWeights, tests: ReprojectionTests,
+               known: Any = None) -> Accumulated:
     """Blend with the history.
 
     Args:
+        refine: what is made of the history first, with `known`.
         motion: of `reprojection.motion_between`.
         records: `history.pack_records` of what this gave for the frame before, which may have
             got other colours.
@@ -82,9 +106,12 @@ def accumulate(stencil: Stencil, fallback: bool, signals: list[LuminanceColor],
     """
     place = locate(stencil, surface, motion, tests.plane_tolerance)
     count = max(len(changes), 1)
-    values, is_valid = look_up(stencil, place, records,
-                               count + (_COLOR + _MOMENTS) * len(signals), tests.min_cosine,
-                               fallback)
+    size = record_values(len(signals), count)
+    found = look_up(stencil, place, records, size, tests.min_cosine, fallback,
+                    words=record_words(size))
+    if refine is not None:
+        found = refine(stencil, Sought(surface, motion, place, records, tests), found, known)
+    values, is_valid = found
     history = _accumulated(values, count)
     lengths, blended = [], []
     for s, (color, old) in enumerate(zip(signals, history.signals, strict=True)):

@@ -18,7 +18,7 @@ SMALL = {"gaussian": {"radius": "4"}, "gaussian-separable": {"radius": "4"},
          "bilateral": {"radius": "4"}, "bilateral-separable": {"radius": "4"},
          "assignment": {"radius": "4"}, "atrous": {"levels": "3"},
          "assignment-atrous": {"levels": "3"}, "temporal": {}, "svgf": {"levels": "3"},
-         "asvgf": {"levels": "3"},
+         "asvgf": {"levels": "3"}, "trmv": {"levels": "3"},
          "bmfr": {"block_size": "8"},
          "taa": {},
          "onespp": {"innovation_levels": "3", "output_levels": "3", "sharp_output_levels": "2"}}
@@ -75,7 +75,7 @@ def test_a_constant_image_stays_constant_at_any_size(name, height, width):
 def test_every_result_lies_between_the_extremes_around_it(name):
     frames = [noisy(make_frame(17, 21, index=i), seed=i) for i in range(3)]
     # History may bring any earlier frame's.
-    reach = 40 if name.startswith(("assignment", "svgf", "asvgf")) else 14
+    reach = 40 if name.startswith(("assignment", "svgf", "trmv", "asvgf")) else 14
     joined = np.stack([f["color"] for f in frames])
     low, high = local_extremes(joined.min(0), reach)[0], local_extremes(joined.max(0), reach)[1]
     result = run(name, *frames, **plain(name))
@@ -152,7 +152,7 @@ def test_a_still_scene_has_less_noise_in_its_result(name):
 
 
 @pytest.mark.parametrize("name", ["temporal", "assignment", "assignment-atrous", "svgf",
-                                  "asvgf", "bmfr"])
+                                  "trmv", "asvgf", "bmfr"])
 def test_history_makes_a_still_scene_flicker_less(name):
     clean = make_frame(24, 24, wall_end=1e9)
     method = build(name, SMALL[name])

@@ -1,0 +1,1 @@
+"""History along the motion of shadows, of mirror images, and of what uncovers a surface."""
