@@ -6,6 +6,7 @@ files do not say whether y or z is up.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -13,7 +14,9 @@ import numpy as np
 from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Cylinder, Mesh, Scene, Shape, Sphere
+from onespp.scenes.materials import diffuse
 
+_GRAY = diffuse((0.5, 0.5, 0.5))
 _GRID = 8  # rays a side that look how far away things are
 _AROUND = np.array([d for d in product((-1, 0, 1), repeat=3) if any(d)], float)
 _AROUND /= np.linalg.norm(_AROUND, axis=1, keepdims=True)
@@ -43,7 +46,9 @@ class Surroundings:
     """Rays into a scene as it is in frame 0; distances and points are the world's."""
 
     def __init__(self, scene: Scene) -> None:
-        self._stage = MitsubaScene(scene)
+        self._stage = MitsubaScene(replace(  # what things are made of takes long to load
+            scene, environment=1.0, lights=(),
+            shapes=tuple(replace(s, material=_GRAY, emission=None) for s in scene.shapes)))
         self._camera = scene.camera
 
     def focus_distance(self) -> float:
