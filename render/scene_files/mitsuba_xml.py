@@ -56,7 +56,7 @@ def load_xml(path: Path, parameters: Mapping[str, str] | None = None, sensor: in
     root = read_document(path, dict(parameters or {}))
     camera_node = _sensor(root, path, sensor)
     camera, width, height = _camera(camera_node)
-    if media := [*root.parts("medium"), *root.parts("volume")]:
+    if media := camera_node.parts("medium"):
         raise media[0].error("media cannot be rendered here, only surfaces: leave it out")
     integrator = _integrator(root)
     surfaces = Surfaces()
@@ -218,8 +218,12 @@ def _unused(root: Node, camera: Node, integrator: Node | None) -> list[str]:
     said += [f"the sampler '{part.plugin}'" for part in camera.parts("sampler")]
     if camera.plugin == "thinlens":
         said.append("the lens of the camera")
+    if {"near_clip", "far_clip"} & set(camera.values):
+        said.append("the camera's clip distances")
     if integrator is not None:
-        said.append(f"the integrator '{integrator.plugin}' but for its depth")
+        hidden = " (lamps show: 'hide_emitters' too)" if integrator.values.get(
+            "hide_emitters") else ""
+        said.append(f"the integrator '{integrator.plugin}' but for its depth{hidden}")
     others = len(root.parts("sensor")) - 1
     if others:
         said.append(f"{others} other sensor{'s' * (others > 1)}")

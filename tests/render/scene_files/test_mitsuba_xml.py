@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import onespp
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
@@ -17,6 +18,7 @@ from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.animation import spin
 from onespp.scenes.description import LONGEST_PATH, SceneError
 from onespp.scenes.fingerprint import fingerprint
+from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
 from tests.support.xml_scenes import SCENES, write_png, write_quad
 
 PARTS = 4
@@ -65,6 +67,25 @@ def test_a_scene_is_as_bright_as_mitsubas(name: str, tmp_path: Path):
     off = abs(ours.mean(0) - theirs.mean(0))
     assert (off < np.maximum(0.01 * theirs.mean(0), 3 * error)).all()
     assert (error < 0.01 * theirs.mean(0)).all()  # else the line above says little
+
+
+@pytest.mark.parametrize("name", [
+    "glass", *(pytest.param(name, marks=pytest.mark.slow) for name in ("indoor", "foliage"))])
+def test_frames_have_the_mean_of_the_reference(name: str, tmp_path: Path):
+    scene = load_xml(SCENES[name](tmp_path)).scene
+    renderer = Renderer(scene, 16, 24, direct="resampled", sampler="zsobol")
+    frames = [blocks(renderer.frame(0, seed, ("color",))["color"], 8) for seed in range(80)]
+    reference = [blocks(renderer.sample_sum(0, 9, k, 64) / 64, 8) for k in range(16)]
+    assert_same_mean(*mean_and_variance(frames), *mean_and_variance(reference))
+
+
+def test_a_file_is_denoised_and_scored_like_any_scene(tmp_path: Path):
+    scene = onespp.animate(SCENES["foliage"](tmp_path), camera="dolly", moves={"cloth": "swing"})
+    sequence = onespp.render(scene, tmp_path / "out", frames=3, size=(32, 48), reference_spp=64)
+    onespp.denoise(sequence, "onespp")
+    scores = onespp.score(sequence)
+    gain = scores.methods["onespp"]["psnr_srgb"] - scores.methods["input"]["psnr_srgb"]
+    assert gain > 5
 
 
 @pytest.mark.parametrize("light", [
@@ -198,6 +219,23 @@ def test_instances_and_names_and_what_is_not_used(tmp_path: Path):
                              "'independent', the integrator 'path' but for its depth")
     leaves = [s for s in loaded.scene.shapes if s.name.startswith(("left", "right"))]
     assert len({id(shape.material) for shape in leaves}) == 1
+
+
+def test_what_is_not_used_is_told_once(tmp_path: Path):
+    text = scene_xml(BALL + SKY + '<medium type="homogeneous" id="fog"/>'
+                     '<sensor type="perspective"><float name="fov" value="9"/></sensor>',
+                     '<float name="fov" value="50"/><float name="near_clip" value="0.1"/>'
+                     '<float name="aperture_radius" value="0.1"/>'
+                     '<float name="focus_distance" value="4"/>').replace(
+        '"perspective">', '"thinlens">', 1).replace(
+        '<integrator type="path">', '<integrator type="path"><boolean name="hide_emitters" '
+                                    'value="true"/>')
+    loaded = load_xml(written(tmp_path, text))
+    assert loaded.unused == (
+        "the film 'hdrfilm' but for its size, the filter 'box', the lens of the camera, the "
+        "camera's clip distances, the integrator 'path' but for its depth (lamps show: "
+        "'hide_emitters' too), 1 other sensor")
+    assert load_xml(tmp_path / "a.xml", sensor=1).scene.camera.fov == 9
 
 
 def test_parameters_are_taken_and_without_a_depth_paths_are_long(tmp_path: Path):
