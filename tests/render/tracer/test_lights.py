@@ -87,7 +87,8 @@ def test_visibility_is_bounded_where_unshadowed_light_underflows():
     nothing = mi.Color3f(0)
     tiny = mi.Color3f(mi.Float([1e-30, 0.0, 2.0]))
     split: Any = SimpleNamespace(unshadowed=tiny)
-    radiance = Radiance(nothing, nothing, nothing, nothing, mi.Float(0), mi.UInt32(0))
+    radiance = Radiance(nothing, nothing, nothing, nothing, mi.Float(0), mi.UInt32(0),
+                        mi.UInt32(0))
     found = _with_split(radiance, mi.Color3f(3.0), split)
     assert found.visibility is not None
     np.testing.assert_allclose(found.visibility.numpy(), [LARGEST_VISIBILITY, 0, 1.5], rtol=1e-6)
