@@ -36,6 +36,7 @@ from onespp.denoise.oracles import filters as oracles
 from onespp.denoise.oracles import svgf as svgf_oracles
 from onespp.denoise.oracles.bmfr import bmfr
 from onespp.denoise.oracles.taa import taa
+from onespp.denoise.oracles.trmv import trmv
 from onespp.denoise.peers.oidn import AVAILABLE, Oidn
 from onespp.render.frame import Frame
 from onespp.render.host import backend
@@ -110,6 +111,7 @@ KERNELS = {
         previous, frame, oracles.atrous(previous), oracles.atrous(frame)),
         *_both(_ATROUS, _TEMPORAL)),
     "svgf": Kernel(lambda *frames: svgf_oracles.svgf(list(frames)), textured=True),
+    "trmv": Kernel(lambda *frames: trmv(frames), textured=True),
     "asvgf": Kernel(lambda *frames: svgf_oracles.asvgf(list(frames)), textured=True),
     "bmfr": Kernel(lambda *frames: bmfr(frames), textured=True),
     "onespp": Kernel(lambda *frames: innovation_oracle.run(list(frames), FilteredInnovation()),

@@ -22,6 +22,7 @@ _SIDE, _DEPTH = 3.0, 6.0  # of the square, scene units
 _LAMP, _LAMP_ID, _LAMP_SIZE = np.array([1.5, -2.0, 2.0]), 2, 0.15  # centre, standard deviation
 _DIRECT, _GLOSSY = 0.6, 0.2  # share of direct light in all, of specular in indirect light
 _ROUGHNESS = 0.3
+_HIT_DISTANCE = 2.5  # from wall to square, and from square to wall: what their paths say
 _STRATUM = 3  # pixels, side: one of them is shaded again
 
 
@@ -29,8 +30,8 @@ def probe(height: int, width: int, index: int, textured: bool = True) -> Frame:
     """Frame `index` of the animation.
 
     With `textured` it has albedo and all that a method of ours reads: emission (black), direct,
-    indirect and specular light, roughness, unshadowed light and visibility, shadow rays, samples
-    shaded again.
+    indirect and specular light, roughness, what reflections show, unshadowed light and visibility,
+    shadow rays, samples shaded again.
     """
     focal = 0.8 * width
     eye = np.array([0.02 * index, 0.0, 0.0])
@@ -67,8 +68,10 @@ def probe(height: int, width: int, index: int, textured: bool = True) -> Frame:
             "indirect": indirect, "specular": _GLOSSY * indirect,
             "roughness": np.where(id_ < 0, 1, _ROUGHNESS), "unshadowed": unshadowed,
             "visibility": visibility, "light": toward,
-            "blocker_distance": fraction * np.linalg.norm(toward, axis=-1)}
-        ids |= {"light_id": np.where(id_ < 0, -1, _LAMP_ID),
+            "blocker_distance": fraction * np.linalg.norm(toward, axis=-1),
+            "hit_distance": np.where(id_ < 0, 0, _HIT_DISTANCE)}
+        ids |= {"hit_id": np.where(id_ < 0, -1, 1 - id_),
+                "light_id": np.where(id_ < 0, -1, _LAMP_ID),
                 "blocker_id": np.where(fraction > 0, 1, -1)}
         was_lit = _blocked_at(position, toward, id_, index - 1) == 0
         sampled = _one_a_stratum(height, width, rng)

@@ -15,7 +15,7 @@ import drjit as dr
 from .arrays import Bool, Float
 from .grid import Stencil
 
-WORDS = 8  # floats a lane in the table of a window: what one gather brings
+WORDS = 8  # floats a lane in the table of a window are so many or a multiple: what a gather brings
 
 _while_loop: Any = dr.while_loop  # its type hints know loops of one variable only
 
@@ -40,8 +40,8 @@ def weighted_sums(stencil: Stencil, active: Bool, taps: int, count: int,
 
 
 def tabulate(stencil: Stencil, words: Sequence[Float]) -> Float:
-    """The table of a window: up to `WORDS` numbers a lane."""
-    return stencil.pack([*words, *[stencil.Float(0)] * (WORDS - len(words))])
+    """The table of a window: numbers a lane, and zeros up to a multiple of `WORDS`."""
+    return stencil.pack([*words, *[stencil.Float(0)] * (-len(words) % WORDS)])
 
 
 class WindowTap(NamedTuple):
@@ -53,8 +53,13 @@ class WindowTap(NamedTuple):
     words: list[Float]
 
 
-def window_taps(stencil: Stencil, radius: int, table: Float) -> Callable[[Any], WindowTap]:
-    """Function of a tap's index in the window of (2 radius + 1)^2 pixels, the pixel included."""
+def window_taps(stencil: Stencil, radius: int, table: Float,
+                count: int = WORDS) -> Callable[[Any], WindowTap]:
+    """Function of a tap's index in the window of (2 radius + 1)^2 pixels, the pixel included.
+
+    Args:
+        count: numbers a lane in the table.
+    """
     row, column = (stencil.Int(i) for i in stencil.pixel())
     side = 2 * radius + 1
 
@@ -65,6 +70,6 @@ def window_taps(stencil: Stencil, radius: int, table: Float) -> Callable[[Any], 
         inside = (y >= 0) & (y < stencil.height) & (x >= 0) & (x < stencil.width)
         lane = stencil.UInt(dr.select(inside, y * stencil.stride + x, 0))
         return WindowTap(inside, stencil.Float(dy), stencil.Float(dx),
-                         stencil.unpack(table, lane, WORDS))
+                         stencil.unpack(table, lane, count + -count % WORDS, count))
 
     return tap

@@ -38,7 +38,7 @@ from onespp.denoise.jit.structure import arrays_of
 FORGETTING = 10      # power of 1 - lambda that a length is multiplied by
 SHORT = 4.0          # frames of history from which on its moments give the variance
 RADIUS = 3           # pixels, of the window of the spatial estimate
-_COLOR, _MOMENTS = 3, 2
+_COLOR, _MOMENTS, _GUIDES = 3, 2, 4
 
 
 class Moments(NamedTuple):
@@ -160,13 +160,14 @@ def estimate_variances(stencil: Stencil, accumulated: Accumulated, geometry: Geo
     lengths, signals = accumulated
     is_short = [h < min_temporal_length for h in lengths]
     active = reduce(or_, is_short)
-    count, around = _MOMENTS * len(signals), window_taps(stencil, RADIUS, window_table)
+    count = _MOMENTS * len(signals)
+    around = window_taps(stencil, RADIUS, window_table, count + _GUIDES)
     tolerance = geometry.tolerance
 
     def tap(i: Any) -> tuple[Float, list[Float]]:
         inside, dy, dx, words = around(i)
         gradient = dr.abs(dr.fma(tolerance.dx, dx, tolerance.dy * dy))
-        w = exp2(geometry_exponent(geometry, guides_of(*words[count:count + 4]), gradient,
+        w = exp2(geometry_exponent(geometry, guides_of(*words[count:]), gradient,
                                    normal_exponent))
         return dr.select(inside, w, 0), words[:count]
 

@@ -267,18 +267,23 @@ def shadow_history(previous: Frame, frame: Frame, told: np.ndarray, image: np.nd
     around = spread_out(frame, np.concatenate([moves, np.where(moves, shift, 0)], -1), m)
     near = (around[..., 0] > 1e-3) & (kind_of(frame) == 2)  # a lamp has no shadow
     shift = np.where(near[..., None], around[..., 1:] / np.maximum(around[..., :1], 1e-3), 0)
+    moved = on_tangent_planes(frame, shift, near)
+    history, found = look_up(previous, moved, image, m)
+    return history, found & near
+
+
+def on_tangent_planes(frame: Frame, shift: np.ndarray, there: np.ndarray) -> Frame:
+    """The frame with positions moved by (h, w, 2) pixels on the screen, where there."""
     position = frame["position"].astype(float)
     eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
-    for y, x in np.argwhere(near & (frame["id"] >= 0)):  # on the tangent plane
+    for y, x in np.argwhere(there & (frame["id"] >= 0)):
         column, row = shift[y, x] + [x + 0.5, y + 0.5]
         on_screen = np.linalg.inv(frame.screen_from_world) @ [column, row, 1, 1]
         ray = on_screen[:3] / on_screen[3] - eye
         n = frame["normal"][y, x].astype(float)
         position[y, x] = eye + ray * (n @ (position[y, x] - eye)) / (n @ ray)
-    moved = Frame(frame.index, {**frame.images, "position": position}, frame.camera_from_world,
-                  frame.screen_from_world, frame.world_from_object)
-    history, found = look_up(previous, moved, image, m)
-    return history, found & near
+    return Frame(frame.index, {**frame.images, "position": position}, frame.camera_from_world,
+                 frame.screen_from_world, frame.world_from_object)
 
 
 def light_sizes(frame: Frame) -> dict[int, float]:

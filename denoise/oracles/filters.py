@@ -201,13 +201,18 @@ def previous_screen(previous: Frame, frame: Frame) -> np.ndarray:
 
 
 def reproject_bilinear(previous: Frame, frame: Frame, history: np.ndarray, min_cosine: float = 0.9,
-                       plane_tolerance: float = 0.02, fallback: bool = False) -> np.ndarray:
+                       plane_tolerance: float = 0.02, fallback: bool = False,
+                       at: np.ndarray | None = None) -> np.ndarray:
     """(h, w, c) history of each pixel from tested bilinear taps; NaN where there is none.
 
-    fallback: where none passes, the mean of those of the 3x3 pixels around that do.
+    Args:
+        fallback: where none passes, the mean of those of the 3x3 pixels around that do.
+        at: (h, w, 2) screen positions to look at, NaN for none, instead of where surfaces were.
     """
     h, w = frame["id"].shape
     screen, result = previous_screen(previous, frame), np.full(history.shape, np.nan)
+    if at is not None:
+        screen[..., :2] = at
     for y, x in np.argwhere(frame["id"] >= 0):
         i = frame["id"][y, x]
         motion = previous.world_from_object[i] @ np.linalg.inv(frame.world_from_object[i])

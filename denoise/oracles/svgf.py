@@ -3,6 +3,8 @@ kernels."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from onespp.render.frame import Frame
@@ -87,12 +89,15 @@ def svgf(frames: list[Frame], alpha: float = 0.2, alpha_moments: float = 0.2,
          demodulate: bool = True, split: bool = True, accumulate: bool = True,
          fallback: bool = True, temporal_variance: bool = True,
          feedback: bool = True, alpha_indirect: float | None = None,
-         changes: list[np.ndarray] | None = None) -> np.ndarray:
+         changes: list[np.ndarray] | None = None,
+         refine: Callable[..., np.ndarray] | None = None, specular: bool = False) -> np.ndarray:
     """The last frame's result; parameters as of `onespp.denoise.methods.svgf.Svgf`.
 
     Args:
         alpha_indirect: that of indirect light; None: `alpha`.
         changes: (h, w, signals) lambda of each frame (A-SVGF); None: 0 everywhere.
+        refine: (previous, frame, records, history, direct light) to another history.
+        specular: as a third signal, without texture, not as a part of indirect light.
     """
     records, previous, result = None, frames[0], np.zeros(0)
     for i, frame in enumerate(frames):
@@ -103,13 +108,18 @@ def svgf(frames: list[Frame], alpha: float = 0.2, alpha_moments: float = 0.2,
         emission = frame["emission"].astype(np.float64) if split or demodulate else 0
         lights = [frame[n] / albedo if split else (frame["color"] - emission) / albedo
                   for n in names]
+        if specular:
+            lights = [lights[0], lights[1] - frame["specular"] / albedo,
+                      frame["specular"].astype(np.float64)]
         now = [np.concatenate([c, luminance(c)[..., None], luminance(c)[..., None]**2], -1)
                for c in lights]
         old = np.full((*shape, 6 * len(now)), np.nan)
         if records is not None and accumulate:
             old = oracles.reproject_bilinear(previous, frame, records, min_cosine,
                                              plane_tolerance, fallback)
-        kept, result = [], np.zeros((*shape, 3))
+            if refine:
+                old = refine(previous, frame, records, old, now[0][..., :3])
+        kept, result, bare = [], np.zeros((*shape, 3)), np.zeros((*shape, 3))
         for s, signal in enumerate(now):
             before, found = old[..., 6 * s + 1:6 * s + 6], np.isfinite(old[..., 6 * s:6 * s + 1])
             change = changes[i][..., s:s + 1] if changes else np.zeros((*shape, 1))
@@ -131,9 +141,12 @@ def svgf(frames: list[Frame], alpha: float = 0.2, alpha_moments: float = 0.2,
                                         sigma_depth, normal_power)
                 first = color if k == 0 else first
             kept += [length, first if feedback else mixed[..., :3], mixed[..., 3:]]
-            result += color
+            if s == 2:
+                bare = color
+            else:
+                result += color
         records, previous = np.concatenate(kept, -1), frame
-        result = result * albedo + emission
+        result = result * albedo + bare + emission
     return result
 
 
