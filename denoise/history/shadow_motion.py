@@ -121,14 +121,15 @@ def look_up_shadow(stencil: Stencil, surface: SurfaceSample, plane: TangentPlane
 
 
 def shadow_place(stencil: Stencil, surface: SurfaceSample, plane: TangentPlane, motion: Motion,
-                 shadow: ShadowMotion, tests: ReprojectionTests) -> tuple[Place, Bool]:
+                 shadow: ShadowMotion, tests: ReprojectionTests,
+                 min_share: float = MIN_SHARE) -> tuple[Place, Bool]:
     """Where each pixel's shadow was, and the mask of those whose shadow moves.
 
     Args:
         plane: of the surface; its `scale` is not used. motion: of `motion_between`.
-        shadow: of `shadow_motion`, smoothed.
+        shadow: of `shadow_motion`, smoothed. min_share: of the pixels around that tell of one.
     """
-    moves = shadow.moves > MIN_SHARE
+    moves = shadow.moves > min_share
     norm = 1 / dr.select(moves, shadow.moves, 1)
     shift = ScreenShift(*[dr.select(moves, x * norm, 0) for x in (shadow.dx, shadow.dy)])
     inverse_depth = dr.fma(plane.dx, shift.dx, dr.fma(plane.dy, shift.dy, plane.inverse_depth))

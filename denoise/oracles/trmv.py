@@ -24,6 +24,7 @@ def trmv(frames: Sequence[Frame], shadow_motion: bool = True, glossy_motion: boo
         if dual_motion:
             beside = reproject_bilinear(previous, frame, records,
                                         at=place_beside_occluder(previous, frame))
+            beside[..., ::6] = np.minimum(beside[..., ::6], 1)  # lengths
             old = np.where(np.isfinite(old[..., :1]), old, beside)
         is_valid = np.isfinite(old[..., 0])
         if shadow_motion:
@@ -106,7 +107,7 @@ def shadow_surroundings(previous: Frame, frame: Frame,
         same = frame["id"][window] == frame["id"][y, x]
         told = shift[window][same]
         told = told[np.isfinite(told[:, 0])]
-        if len(told) > 1e-3 * same.sum():
+        if len(told) > 0.25 * same.sum():
             was[y, x] = told.mean(0)
         mean[y, x], sigma[y, x] = light[window][same].mean(0), light[window][same].std(0)
     return was, mean, sigma

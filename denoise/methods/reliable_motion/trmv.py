@@ -18,7 +18,10 @@ Departures, beside those of SVGF and of these modules:
 - A history along one of the motions is one of the same surface: its pixels pass the tests of
   `reprojection.py`, and where none does, what was found where the surface was is kept. Only that of
   shadows is clamped.
-- Shadows and images replace the history of a pixel, but not its length.
+- Shadows and images replace the history of a pixel, but not its length. That from beside an
+  occluder is of another place: it counts as one frame, however long it is.
+- A shadow moves where more than a quarter of the rays around were stopped by what moves it; the
+  paper takes pixels one by one.
 - A scene's lights are one signal, and a shadow takes the light of all of them along.
 """
 
@@ -53,6 +56,7 @@ from .mirror_images import NEEDED, Reflection, image_place, read_reflection
 from .shadow_window import clamped, surroundings, tabulate_shadows
 from .uncovered import beside_occluder
 
+LEAST_SHARE = 0.25  # of the pixels of 7x7, below which no shadow moves; on two generated scenes
 _DIRECT, _SPECULAR = slice(1, 6), slice(11, 16)  # of a record's values
 
 
@@ -162,12 +166,13 @@ def follow_light(stencil: Stencil, sought: Sought, found: LookUp, known: Known) 
     if known.dual is not None:
         beside, hidden = beside_occluder(stencil, place, records, words, known.dual)
         there = along(beside, hidden & ~is_valid)
+        there.values[0] = dr.minimum(there.values[0], 1)
         values = [dr.select(there.is_valid, t, v) for t, v in zip(there.values, values)]
         is_valid |= there.is_valid
     if known.shadows is not None:
         around = surroundings(stencil, stencil.Float(surface.id), known.shadows.table)
         was, moves = shadow_place(stencil, surface, known.shadows.plane, motion, around.motion,
-                                  tests)
+                                  tests, LEAST_SHARE)
         there = along(was, moves & is_valid)
         light = there.values[_DIRECT]
         _replace(values, _DIRECT, [*clamped(light[:3], around), *light[3:]], there.is_valid)
