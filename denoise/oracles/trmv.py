@@ -1,4 +1,4 @@
-"""TRMV in float64 NumPy, in world space, a pixel at a time; see denoise/methods/reliable_motion/."""
+"""TRMV in float64 NumPy, in world space, a pixel at a time; see methods/reliable_motion/."""
 
 from __future__ import annotations
 
@@ -84,8 +84,8 @@ def image_place(previous: Frame, frame: Frame) -> np.ndarray:
         p, n = frame["position"][y, x].astype(float), frame["normal"][y, x].astype(float)
         v = (p - eye) / np.linalg.norm(p - eye)
         hit = p + frame["hit_distance"][y, x] * (v - 2 * (v @ n) * n)
-        surface = motion_of(previous, frame, frame["id"][y, x])
-        hit = (motion_of(previous, frame, frame["hit_id"][y, x]) @ [*hit, 1])[:3]
+        surface = motion_of(previous, frame, int(frame["id"][y, x]))
+        hit = (motion_of(previous, frame, int(frame["hit_id"][y, x])) @ [*hit, 1])[:3]
         p, n = (surface @ [*p, 1])[:3], surface[:3, :3] @ n
         height = (hit - p) @ n
         image = projected(previous, hit - 2 * height * n)

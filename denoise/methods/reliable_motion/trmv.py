@@ -49,7 +49,6 @@ from onespp.denoise.jit.structure import evaluate
 from onespp.render.channels import SHADOW
 from onespp.render.frame import Frame
 
-from ..parameters import HISTORY_RENAMED
 from ..svgf import SIGNALS, Light, Passes, Svgf
 from ..svgf_accumulation import Refine, Sought
 from .mirror_images import NEEDED, Reflection, image_place, read_reflection
@@ -84,8 +83,9 @@ class Trmv(Svgf):
     dual_motion: bool = True
 
     uses: ClassVar[tuple[str, ...]] = (*SIGNALS, *SHADOW, *NEEDED)
-    renamed: ClassVar[Mapping[str, str]] = HISTORY_RENAMED
-    refine: ClassVar[Refine | None] = staticmethod(lambda *a: follow_light(*a))
+    renamed: ClassVar[Mapping[str, str]] = {}
+    refine: ClassVar[Refine | None] = staticmethod(
+        lambda stencil, sought, found, known: follow_light(stencil, sought, found, known))
 
     def init_on(self, stencil: Stencil) -> TrmvState:
         return TrmvState(stencil, no_history(stencil),

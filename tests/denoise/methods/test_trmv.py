@@ -47,8 +47,8 @@ def test_what_a_board_uncovers_takes_history_from_beside_where_the_board_was():
     """The wall is painted with its columns, before and now; the board moves six pixels."""
     frames = [with_images(make_frame(24, 48, index=i, board=translation(0.625 * i, 0, 0),
                                      wall_end=1e9), color=color)
-              for i, color in enumerate(([np.arange(48.0)[None, :, None] * np.ones((24, 1, 3)),
-                                          np.full((24, 48, 3), 1e3)]))]
+              for i, color in enumerate([np.arange(48.0)[None, :, None] * np.ones((24, 1, 3)),
+                                          np.full((24, 48, 3), 1e3)])]
     settings = {"levels": 1, "demodulate": False, "split": False, "alpha": 1e-6}
     method = Trmv(**settings, **only("dual_motion"), feedback=False, fallback=False)
     _, state = method(frames[0], method.init(24, 48))
@@ -71,7 +71,8 @@ def test_a_mirror_image_is_looked_for_where_it_was_seen():
     frames = [renderer.frame(i, channels=(*FRAME, *GLOSS)) for i in (4, 6)]
     stencil = Stencil(48, 64, 1)
     surface = read_surface(frames[1], stencil)
-    place = locate(stencil, surface.sample, motion_between(*frames, stencil), stencil.Float(1))
+    motion = motion_between(frames[0], frames[1], stencil)
+    place = locate(stencil, surface.sample, motion, stencil.Float(1))
     reflection = read_reflection(frames[1], frames[0], surface.position, stencil)
     image, there = image_place(stencil, surface.sample, reflection, place)
     at = stencil.image([image.x, image.y, stencil.Float(there)])
