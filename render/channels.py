@@ -181,7 +181,8 @@ OFFERED = channels_of(*(group for group in Group if group not in (Group.TRUTH, G
 """What a rendered frame can carry."""
 TRAINING = tuple(name for name in OFFERED if name not in (
     "color", "position", "hit_distance", "hit_id", *REPLAY))
-"""What methods and training read, without what follows from it (`render/derived.py`)."""
+"""What training and methods read, but for what `asvgf` and `trmv` alone do, without what follows
+from it (`render/derived.py`)."""
 REFERENCE = ("color", "half", "quarter0", "quarter1")
 """What the file of a reference has."""
 

@@ -5,8 +5,8 @@ hidden, or the light itself moves over it. Three more motions, each a switch:
 
 - **shadow** (`history/shadow_motion.py`, `shadow_window.py`): direct light where a shadow moves.
 - **glossy** (`mirror_images.py`): specular light where the image that is reflected was seen; it is
-  then a signal of its own, over which no albedo is. For frames with the channels `specular`,
-  `hit_distance` and `hit_id` (render with `--channels +hit_distance,hit_id`).
+  then a signal of its own, over which no albedo is. Frames of scenes with glossy surfaces have
+  what it needs: `specular`, `hit_distance` and `hit_id`.
 - **dual** (`uncovered.py`): a surface that was hidden takes history from beside the occluder.
 
 With all three off it is `svgf`, bit by bit.
