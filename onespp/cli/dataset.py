@@ -81,8 +81,8 @@ def dataset(plan: str | None, out: Path | None, settings: tuple[str, ...], previ
     found = data.status()
     click.echo(f"{data.folder}: {found}")
     if found.failed:
-        raise InputError(f"{len(found.failed)} sequences could not be made: see "
-                         f"{data.folder}/failures, then run the same command again")
+        raise InputError(f"{len(found.failed)} of {data.plan.sequences} sequences could not be "
+                         f"made: see {data.folder}/failures, then run the same command again")
 
 
 def _verify(data: DataSet) -> None:

@@ -100,10 +100,10 @@ class Status:
     seconds_left: float | None
 
     def __str__(self) -> str:
-        text = (f"{self.made} sequences are made ({self.bytes / 2**20:.1f} MiB), {self.left} are "
-                "left")
+        text = (f"{self.made} of {self.made + self.left} sequences are made "
+                f"({self.bytes / 2**20:.1f} MiB)")
         if self.left and self.seconds_left is not None:
-            text += f", about {self.seconds_left / 60:.1f} minutes at the last pace"
+            text += f", the rest takes {self.seconds_left / 60:.1f} minutes at the last pace"
         if self.failed:
             text += f"; failed: {', '.join(map(str, self.failed[:20]))} (see failures/)"
         return text

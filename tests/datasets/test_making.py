@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import onespp
+from onespp.api.datasets import preview
 from onespp.datasets import look, making
 from onespp.datasets.folder import DataSet, DataSetFile, Made
 from onespp.datasets.plan import Plan, changed_plan, read_plan
@@ -99,7 +101,7 @@ def test_a_byte_that_changed_and_a_sequence_that_is_gone_are_found(copy, call):
     code, out, err = call("dataset", "--verify", copy.folder)
     assert (code, str(path) in out) == (2, True)
     assert "is not whole: 2 things are wrong" in err
-    assert "1 are left" in call("dataset", "--status", "--out", copy.folder)[1]
+    assert "1 of 2 sequences are made" in call("dataset", "--status", "--out", copy.folder)[1]
 
 
 def test_a_sequence_that_fails_is_tried_twice_and_does_not_stop_the_others(monkeypatch, quick):
@@ -174,6 +176,40 @@ def test_a_folder_holds_one_data_set_which_may_grow(quick, plan, tmp_path):
         DataSet.open(tmp_path / "mine")
 
 
+def test_the_command_says_what_was_made_and_what_was_not(quick, call, monkeypatch, tmp_path):
+    command = ("dataset", "simple", "--sequences", 2, "--size", "24x16", "--frames", 2, "--out",
+               tmp_path / "d", "--set", "draw.things=[3, 4]", "--reference-error", 0.5)
+    code, out, err = call(*command)
+    assert (code, out) == (0, f"{tmp_path / 'd'}: 2 of 2 sequences are made (0.0 MiB)\n"), err
+    plan = DataSet.open(tmp_path / "d").plan
+    assert (plan.width, plan.height, plan.draw.things) == (24, 16, (3, 4))
+    assert (plan.reference_spp, plan.reference_error) == (None, 0.5)
+    (tmp_path / "d/train/000000/sequence.json").unlink()
+
+    def fails(*arguments):
+        raise ValueError("no luck")
+
+    monkeypatch.setattr(making, "make", fails)
+    code, out, err = call(*command)
+    assert code == 2
+    assert "sequence 0 failed twice (no luck)" in out
+    assert "1 of 2 sequences could not be made" in err
+    for wrong, words in (((), "there is no PLAN"), (("roms",), "did you mean 'rooms'"),
+                         (("rooms", "--set", "draw.thing=1"), "unknown key 'draw.thing'"),
+                         (("rooms", "--part", "3/2", "--out", tmp_path / "d"), "use K/N")):
+        code, _, err = call("dataset", *wrong)
+        assert (code, words in err) == (2, True), err
+
+
+def test_a_preview_shows_the_first_scenes(made, tmp_path):
+    lines = preview(made.plan, 1, tmp_path / "sheet.png")
+    assert [line.split()[:2] for line in lines] == [["0", "train"]]
+    sheet = np.asarray(Image.open(tmp_path / "sheet.png"))
+    first, gap = sheet[4:20, 4:28], sheet[:4]
+    assert gap.std() == 0
+    assert first.std() > 5
+
+
 @pytest.fixture(scope="module")
 def drawn() -> Drawn:
     return draw(read_plan("simple", {"frames": 2}).request(0))
@@ -213,5 +249,6 @@ def test_a_draw_that_is_rejected_is_drawn_again(monkeypatch, plan):
     found = look.usable(plan, 0)
     assert (found.drawn.record["attempt"], found.rejected) == (1, ["frame 0 is dark"])
     monkeypatch.setattr(look, "unlike_a_picture", lambda drawn, frames: "frame 0 is dark")
-    with pytest.raises(InputError, match="none of 20 draws of sequence 0 of 'simple'"):
+    monkeypatch.setattr(look, "MOST_ATTEMPTS", 2)
+    with pytest.raises(InputError, match="none of 2 draws of sequence 0 of 'simple'"):
         look.usable(plan, 0)
