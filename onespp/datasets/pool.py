@@ -8,10 +8,13 @@ of a worker, waits for the other by the lock on the sequence's folder.
 
 from __future__ import annotations
 
+import logging
 import os
+import signal
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +28,7 @@ from .making import Outcome, in_a_line, make
 
 LOCAL = "local"
 _SECONDS_TO_CONNECT = 15
+_SECONDS_BETWEEN_LOOKS = 0.2
 _SECONDS_FOR_ANOTHER = 3600.0  # that a sequence may take the process that has it
 
 
@@ -49,8 +53,6 @@ def make_by_pool(data: DataSet, numbers: Iterable[int], address: str, workers: i
     waiting = [n for n in numbers if n not in there]
     folder = str(data.folder.resolve())
     with _client(address, workers) as client:
-        from distributed import as_completed
-
         if address == LOCAL:
             threads = threads or max(1, (os.cpu_count() or 1) // _workers(workers))
         for last in (False, True):
@@ -59,8 +61,8 @@ def make_by_pool(data: DataSet, numbers: Iterable[int], address: str, workers: i
                                    key=f"{data.plan.key}-{n}-{int(last)}"): n for n in waiting}
             waiting = []
             progress(len(outcome.made), len(numbers), what)
-            for done in as_completed(list(tasks)):
-                number = tasks[done]
+            for done, number in _as_they_end(tasks, lambda: progress(len(outcome.made),
+                                                                     len(numbers), what)):
                 error = done.exception() if done.status == "error" else None
                 if error is None and done.status == "finished":
                     outcome.made.append(number)
@@ -72,8 +74,20 @@ def make_by_pool(data: DataSet, numbers: Iterable[int], address: str, workers: i
                     else:
                         waiting.append(number)
                         tell(f"sequence {number} failed and gets a second try: {in_a_line(error)}")
-                progress(len(outcome.made), len(numbers), what)
+            progress(len(outcome.made), len(numbers), what)
     return outcome
+
+
+def _as_they_end(tasks: Mapping[Any, int], look: Callable[[], None]) -> Iterator[tuple[Any, int]]:
+    """Tasks and their numbers; `look` is called all the while, so that Ctrl-C is heard."""
+    pending = dict(tasks)
+    while pending:
+        ended = [future for future in pending if future.done()]
+        for future in ended:
+            yield future, pending.pop(future)
+        look()
+        if not ended:
+            time.sleep(_SECONDS_BETWEEN_LOOKS)
 
 
 def task(folder: str, number: int, threads: int | None) -> tuple[str, str]:
@@ -104,6 +118,21 @@ def _workers(asked: int | None) -> int:
 
 
 @contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Threads and processes that are started here never hear of Ctrl-C, which a terminal sends to
+    all: the one that is asked to stop ends them. What is pressed meanwhile is heard at the end."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    resource_tracker.ensure_running()  # its start, later, would let interrupts through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
 def _client(address: str, workers: int | None) -> Iterator[Any]:
     """A client of the scheduler, which ends with it if it was started here."""
     try:
@@ -112,10 +141,12 @@ def _client(address: str, workers: int | None) -> Iterator[Any]:
         raise InputError("--dask needs Dask.distributed, which is not installed: pip install "
                          "'onespp[dask]'") from None
     if address == LOCAL:
-        with (distributed.LocalCluster(
+        with _without_interrupts():
+            cluster = distributed.LocalCluster(
                 n_workers=_workers(workers), threads_per_worker=1, processes=True,
-                dashboard_address=None) as cluster,  # pyright: ignore[reportArgumentType]
-              distributed.Client(cluster) as client):
+                silence_logs=logging.CRITICAL,  # of workers that are ended in the middle of a task
+                dashboard_address=None)  # pyright: ignore[reportArgumentType]
+        with cluster, distributed.Client(cluster) as client:
             yield client
         return
     try:

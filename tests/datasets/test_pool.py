@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -63,6 +64,28 @@ def test_workers_that_are_killed_lose_nothing(tmp_path):
     assert data.verify() == []
     left = {name: text for name, text in files(data.folder).items() if not name.endswith(".lock")}
     assert left == files(tmp_path / "one")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a group of processes")
+def test_ctrl_c_ends_a_pool_and_the_same_command_goes_on(tmp_path, call):
+    """Sent to all processes, as a terminal does."""
+    pytest.importorskip("distributed")
+    command = ["dataset", "simple", "--sequences", "4", "--frames", "2", "--size", "24x16",
+               "--reference-spp", "16", "--dask", "local", "--workers", "2", "--out",
+               str(tmp_path / "d")]
+    with subprocess.Popen([sys.executable, "-m", "onespp", *command], stderr=subprocess.PIPE,
+                          text=True, start_new_session=True) as process:
+        while not list((tmp_path / "d").rglob("frames/*.exr")):
+            assert process.poll() is None
+            time.sleep(0.1)
+        os.killpg(process.pid, signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert "the same command goes on from there" in err
+    assert "Traceback" not in err
+    assert call(*command)[0] == 0
+    assert DataSet.open(tmp_path / "d").verify() == []
 
 
 @pytest.mark.slow
