@@ -66,6 +66,14 @@ class RecordState(Generic[PassesT]):
     passes: PassesT | None = None
 
 
+class Scatter(NamedTuple):
+    """How a value differs among the taps that pass: its variance by their weights w, which add up
+    to 1, and sum w^2."""
+
+    variance: Float
+    concentration: Float
+
+
 def surface_at(stencil: Stencil, records: Float, lane: UInt, words: int) -> SurfaceSample:
     """The surface that records of so many words show in a pixel of the previous frame."""
     return _surface_of(stencil.unpack(records, lane, words, _HEAD))
@@ -79,20 +87,24 @@ def _surface_of(record: list[Float]) -> SurfaceSample:
 
 
 class LookUp(NamedTuple):
-    """Values of records, depth first as they were packed, and the mask of pixels that have some."""
+    """Values of records, depth first as they were packed, the mask of pixels that have some, and
+    the scatter of the value that was asked for."""
 
     values: list[Float]
     is_valid: Bool
+    scatter: Scatter | None = None
 
 
 def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosine: Float,
-            fallback: bool = False, active: Bool | None = None, words: int = WORDS) -> LookUp:
+            fallback: bool = False, active: Bool | None = None, words: int = WORDS,
+            scattered: int | None = None) -> LookUp:
     """The first `count` values of the previous frame's records where each pixel's surface was.
 
     Args:
         fallback: take the mean around, see the module's header.
         active: mask of the pixels that ask, if they are few; the others get no history.
         words: of a record, see `record_words`.
+        scattered: of which value the scatter is wanted; not with `fallback` or `active`.
     Returns:
         values that are 0 where there is no history.
     """
@@ -119,6 +131,7 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
         weight = dr.abs(fx + (float_t(dx) - 1)) * dr.abs(fy + (float_t(dy) - 1))
         return dr.select(passes, weight, 0), values
 
+    squares = weights2 = float_t(0)
     if active is None:
         sums, total = [float_t(0)] * count, float_t(0)
         for dy in (0, 1):
@@ -126,6 +139,9 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
                 weight, values = corner(dy, dx)
                 sums = [dr.fma(weight, v, s) for v, s in zip(values, sums)]
                 total += weight
+                if scattered is not None:
+                    squares = dr.fma(weight, dr.square(values[scattered]), squares)
+                    weights2 = dr.fma(weight, weight, weights2)
     else:
         total, sums = weighted_sums(stencil, active & place.inside, 4, count,
                                     lambda i: corner(i >> 1, i & 1))
@@ -142,4 +158,8 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
         total = dr.select(lacking, number, total)
     found = place.inside & (total >= LEAST_WEIGHT)
     scale = dr.select(found, 1 / dr.select(found, total, 1), 0)
-    return LookUp([s * scale for s in sums], found)
+    values = [s * scale for s in sums]
+    if scattered is None:
+        return LookUp(values, found)
+    variance = dr.fma(squares, scale, -dr.square(values[scattered]))
+    return LookUp(values, found, Scatter(variance, weights2 * dr.square(scale)))

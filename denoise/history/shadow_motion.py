@@ -115,8 +115,8 @@ def look_up_shadow(stencil: Stencil, surface: SurfaceSample, plane: TangentPlane
         at: which. words: of a record. The others are those of `shadow_place`.
     """
     place, moves = shadow_place(stencil, surface, plane, motion, shadow, tests)
-    values, is_valid = look_up(stencil, place, records, at + 2, tests.min_cosine, active=moves,
-                               words=words)
+    values, is_valid, _ = look_up(stencil, place, records, at + 2, tests.min_cosine, active=moves,
+                                  words=words)
     return ShadowHistory(values[at], values[at + 1], moves & is_valid)
 
 

@@ -111,7 +111,7 @@ def accumulate(stencil: Stencil, fallback: bool, refine: Refine | None,
                     words=record_words(size))
     if refine is not None:
         found = refine(stencil, Sought(surface, motion, place, records, tests), found, known)
-    values, is_valid = found
+    values, is_valid, _ = found
     history = _accumulated(values, count)
     lengths, blended = [], []
     for s, (color, old) in enumerate(zip(signals, history.signals, strict=True)):

@@ -76,10 +76,11 @@ from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import mapped
 
-from .layout import History, SignalLayout, Smoothed
+from .layout import LUMINANCE_PLACE, History, SignalLayout, Smoothed
 from .noise import MAX_ENERGY
 from .output import FEWEST_SAMPLES
 from .shadows import Shadows
+from .texture import missed
 
 _TIE = 1e-6                    # excess of a history that is no better nor worse
 _NO_HISTORY = -3e14            # 1/z of a pixel without history
@@ -114,6 +115,7 @@ class Innovations(NamedTuple):
         shadows: of the other history of each visibility that has one. footprint_falloffs: of
             `penumbra.py`, of each of those. sparse: of each sparse signal. turned: t of
             `reflections.py`, None where the lobes of glossy light are not known.
+        misses: what reprojection may miss of texture, see `texture.py`.
     """
 
     signals: list[Signal]
@@ -125,6 +127,7 @@ class Innovations(NamedTuple):
     footprint_falloffs: list[Float]
     sparse: list[SparseHistory]
     turned: Float | None
+    misses: Float | None = None
 
 
 def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signal],
@@ -141,8 +144,9 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
     """
     place = locate(stencil, surface, motion, tests.plane_tolerance)
     record_words_ = record_words(layout.record_values)
-    words, is_valid = look_up(stencil, place, records, layout.record_values, tests.min_cosine,
-                              words=record_words_)
+    words, is_valid, scatter = look_up(
+        stencil, place, records, layout.record_values, tests.min_cosine, words=record_words_,
+        scattered=LUMINANCE_PLACE if layout.has_texture else None)
     lengths, history = layout.unpack(words)
     omegas = weights_of(layout, chosen)
     e, sparse = [], []
@@ -175,7 +179,8 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
     return Innovations(e, energies, lengths, variances, valid_inverse_depth, others,
                        [footprint_falloff(shadow.penumbra, falloff_scale, MIN_SHARE)
                         for shadow in shadows], sparse,
-                       None if lobes is None else turned(lobes, surface.normal, place))
+                       None if lobes is None else turned(lobes, surface.normal, place),
+                       None if scatter is None else missed(scatter, variances[0]))
 
 
 def choose_histories(layout: SignalLayout, innovations: Innovations,
@@ -215,7 +220,7 @@ def to_smooth(layout: SignalLayout, innovations: Innovations) -> Smoothed:
         visibility_spread=[innovations.energies[s] for s in layout.visibilities], sharp=sharp,
         shadow_innovation=[shadow.innovation for shadow in innovations.shadows],
         weights=[sparse.weight for sparse in innovations.sparse],
-        energies=innovations.energies[:dense])
+        energies=innovations.energies[:dense], misses=innovations.misses)
 
 
 def pack_history(stencil: Stencil, layout: SignalLayout, surface: SurfaceSample, history: History,

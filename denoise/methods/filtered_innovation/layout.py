@@ -26,15 +26,25 @@ from onespp.render.frame import Frame
 
 T = TypeVar("T")
 ENERGY_LEVELS = 2
+LUMINANCE_PLACE = 1            # among the values of a record, where there is one signal
+
+
+class Pair(NamedTuple):
+    """Luminance of a signal in this frame alone, and in its history."""
+
+    current: Float
+    history: Float
 
 
 class NoisySignal(NamedTuple):
     """A signal and the variance of its luminance's noise; of a sparse one, N, how many samples
-    its history holds, or how much it counts in the last filter."""
+    its history holds, or how much it counts in the last filter; in that filter, of light with
+    texture, what it was made of."""
 
     signal: Signal
     variance: Float
     samples: Float | None = None
+    parts: Pair | None = None
 
 
 class History(NamedTuple):
@@ -55,6 +65,7 @@ class Smoothed(NamedTuple):
         visibility_spread: Q of each visibility. sharp: S[e] of glossy light and of visibility.
         shadow_innovation: S[e] of each of those histories. weights: S[omega] of each sparse signal.
         energies: W[l(e)^2] of each signal that is not sparse.
+        misses: of light with texture, W of what reprojection may miss, see `texture.py`.
     """
 
     diffuse_spread: Float
@@ -65,6 +76,7 @@ class Smoothed(NamedTuple):
     shadow_innovation: list[Float]
     weights: list[Float]
     energies: list[Float]
+    misses: Float | None = None
 
     @property
     def each(self) -> list[Signal]:
@@ -93,6 +105,7 @@ class SignalLayout:
         innovation_levels, output_levels: of diffuse light, in the smoothing of the innovation and
             in the last filter. sharp_*: those of the other signals; the last filter of sparse ones
             has one level less (measured: no worse, and quicker).
+        has_texture: the one signal is light whose texture is not known, see `texture.py`.
     """
 
     kinds: tuple[SignalKind, ...]
@@ -102,6 +115,7 @@ class SignalLayout:
     sharp_innovation_levels: int
     output_levels: int
     sharp_output_levels: int
+    has_texture: bool = False
 
     def check(self, frame: Frame, now: SignalLayout) -> None:
         """InputError where a frame has other signals than the one before it."""
@@ -150,7 +164,8 @@ class SignalLayout:
             sharp=[*glossy, *(Signal(None, one, None) for one in visible)],
             shadow_innovation=chosen,
             weights=visible[len(visible) - self.groups:],
-            energies=[rule(ENERGY_LEVELS)] * (len(self.kinds) - self.groups)))
+            energies=[rule(ENERGY_LEVELS)] * (len(self.kinds) - self.groups),
+            misses=rule(ENERGY_LEVELS) if self.has_texture else None))
 
     def smoothing_level(self, level: int) -> list[PlaneRule]:
         """Rules of the planes that are left at a level, the first so many."""
@@ -170,14 +185,13 @@ class SignalLayout:
         return max(self.sharp_output_levels - (self.group(s) is not None), 1)
 
     def output_planes(self, signals: Sequence[int]) -> int:
-        """Planes of these noisy signals."""
-        return sum((2 if self.kinds[s] is SignalKind.VISIBILITY else 4)
-                   + (self.group(s) is not None) for s in signals)
+        """Planes of these signals in the last filter."""
+        return self._planes(signals) + 2 * self.has_texture
 
     def noisy_signals(self, signals: Sequence[int]) -> Callable[..., list[NoisySignal]]:
         """Function of the planes of these signals, side by side, to the signals."""
-        return lambda *planes: [self._noisy_signal(s, iterator) for iterator in [iter(planes)]
-                                for s in signals]
+        return lambda *planes: [self._with_parts(self._noisy_signal(s, iterator), iterator)
+                                for iterator in [iter(planes)] for s in signals]
 
     def pack(self, history: History) -> list[Any]:
         """What a record holds, in its order (a structure)."""
@@ -193,7 +207,7 @@ class SignalLayout:
 
     @property
     def record_values(self) -> int:
-        return self._lengths + self.output_planes(range(len(self.kinds)))
+        return self._lengths + self._planes(range(len(self.kinds)))
 
     def record_place(self, s: int) -> int:
         """Where a visibility that shadow rays tell of is among the values of a record."""
@@ -212,6 +226,17 @@ class SignalLayout:
     def _looked_up(self) -> int:
         """How many signals are the first in a record."""
         return self.groups or 1
+
+    def _planes(self, signals: Sequence[int]) -> int:
+        """Planes of these noisy signals."""
+        return sum((2 if self.kinds[s] is SignalKind.VISIBILITY else 4)
+                   + (self.group(s) is not None) for s in signals)
+
+    def _with_parts(self, noisy: NoisySignal, planes: Iterator[Float]) -> NoisySignal:
+        """With the parts that follow it, of light with texture."""
+        if not self.has_texture:
+            return noisy
+        return noisy._replace(parts=Pair(next(planes), next(planes)))
 
     def _noisy_signal(self, s: int, planes: Iterator[Float]) -> NoisySignal:
         if self.kinds[s] is SignalKind.VISIBILITY:

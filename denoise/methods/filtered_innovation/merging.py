@@ -16,9 +16,10 @@ from onespp.denoise.jit.structure import mapped
 
 from .change import certainty, coin_variance, lengths_left
 from .innovation import Innovations, ShadowInnovation, weights_of
-from .layout import NoisySignal, SignalLayout, Smoothed
+from .layout import NoisySignal, Pair, SignalLayout, Smoothed
 from .noise import NO_SAMPLE, PRIOR_VARIANCE, spatial_variances
 from .output import FEWEST_SAMPLES, fade_out
+from .texture import error_of_history, parts_of, renewal
 
 MIN_NOISE = 0.25               # share of the innovation's energy that is at least noise of d
 _FILLED = 0.5                  # samples that what was filtered counts for
@@ -50,12 +51,13 @@ class Gains(NamedTuple):
 
 class Merged(NamedTuple):
     """The new history of each signal, its lengths, and `fade_out` of each signal, of sparse ones by
-    their samples."""
+    their samples; of light with texture, what it was made of."""
 
     signals: list[NoisySignal]
     lengths: list[Float]
     fades: list[Float]
     sparse_fades: list[Float]
+    parts: Pair | None = None
 
 
 def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovations: Innovations,
@@ -86,6 +88,12 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
     spatial = spatial_variances(stencil, [signals[s] for s in dense], asks, plane, first)
     visible = dict(zip(layout.visibilities, smoothed.visibility_spread, strict=True))
     merged, sparse_fades = [], []
+
+    def estimated(noise: Float, most: Float, s: int) -> Float:
+        """Noise of a sample, from one frame where history says little of it."""
+        noise = dr.select(is_renewed[s], dr.minimum(spatial[s], most), noise)
+        return dr.select(is_new, spatial[s], noise)
+
     for s, (kind, signal, wide) in enumerate(
             zip(layout.kinds, signals, smoothed.each, strict=True)):
         e = innovations.signals[s]
@@ -103,10 +111,16 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
             alpha = dr.maximum(alpha, turned)
         if omega is None:
             a = dr.maximum(1 / lengths[layout.length(s)], alpha)
-            merged_signal = mapped(_merged(dr.maximum(gain, a), a), signal, e, wide)
             energy = smoothed.energies[s]
-            noise = dr.maximum(energy - variance, energy * MIN_NOISE)
-            most = energy
+            if smoothed.misses is None:
+                noise = estimated(dr.maximum(energy - variance, energy * MIN_NOISE), energy, s)
+            else:
+                error = error_of_history(smoothed.misses, energy)
+                noise = estimated(dr.maximum(energy - variance - error, energy * MIN_NOISE),
+                                  energy, s)
+                a = dr.maximum(a, renewal(error, noise))
+                lengths[layout.length(s)] = dr.minimum(lengths[layout.length(s)], 1 / a)
+            merged_signal = mapped(_merged(dr.maximum(gain, a), a), signal, e, wide)
         else:
             g = s - len(dense)
             old, change = innovations.sparse[g], changes[g]
@@ -118,18 +132,18 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
             v = dr.fma(a, dr.fma(-old.weight, change, e.luminance), v)
             alone = dr.select(first[g] >= 0, first[g], _UNKNOWN)
             merged_signal = Signal(None, dr.select(is_new, alone, v), None)
-            noise = most = coin_variance(old.history + change)
+            noise = coin_variance(old.history + change)
+            noise = estimated(noise, noise, s)
             samples = dr.minimum(known + omega, _MOST_SAMPLES)
             a = dr.select(is_new, dr.select(omega > 0, type(a)(1), 0), dr.minimum(a * omega, 1))
             sparse_fades.append(fade_out(samples, gains.fade_frames))
-        noise = dr.select(is_renewed[s], dr.minimum(spatial[s], most), noise)
-        noise = dr.select(is_new, spatial[s], noise)
         variance = dr.fma(dr.square(1 - a), variance, dr.square(a) * noise)
         if samples is not None:
             variance = dr.select(samples > FEWEST_SAMPLES, variance, PRIOR_VARIANCE)
         merged.append(NoisySignal(merged_signal, variance, samples))
     fades = [fade_out(lengths[layout.length(s)], gains.fade_frames) for s in dense]
-    return Merged(merged, lengths, fades, sparse_fades)
+    parts = parts_of(signals[0], innovations.signals[0]) if layout.has_texture else None
+    return Merged(merged, lengths, fades, sparse_fades, parts)
 
 
 def _only_sample(signal: Signal, omega: Float) -> Float:

@@ -46,6 +46,7 @@ from .layout import ENERGY_LEVELS, History, SignalLayout
 from .merging import Gains
 from .output import narrowed
 from .passes import Passes
+from .texture import LEVELS
 
 _LAMP = 2 * BACKGROUND    # 1/z where albedo is 0: far from any plane, and from background
 _BACKGROUND_SCALE = 1e3   # |k| / sigma_plane of background and lamps: only their like counts
@@ -60,7 +61,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             glossy light [1, 1e-6 to 1].
         visibility_alpha: the same of visibility [1, 1e-6 to 1].
         min_gain: least share of the smoothed innovation that the history of diffuse light takes;
-            all of it where frames have no visibility [1, 1e-6 to 1].
+            all of it where frames have albedo and no visibility [1, 1e-6 to 1].
         noise_threshold: a smoothed innovation whose square is below this many of its variances
             is taken for noise [variances, 0 to 1e6].
         sharp_min_gain: as `min_gain`, of visibility and glossy light [1, 1e-6 to 1].
@@ -80,6 +81,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             those [1, 1 to 8].
         light_sigma: falloff of the last filter with difference of luminance, of diffuse and
             glossy light [standard deviations, above 0].
+        texture_sigma: the same of light whose texture is not known, see `texture.py`
+            [standard deviations, above 0].
         visibility_sigma: the same of visibility [standard deviations, above 0].
         mirror_sigma: the same of what mirrors reflect, at most `light_sigma`; between the two
             where lobes are narrow [standard deviations, above 0].
@@ -118,6 +121,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     sharp_innovation_levels: int = 3
     sharp_output_levels: int = 3
     light_sigma: float = 8.0
+    texture_sigma: float = 3.5
     visibility_sigma: float = 6.0
     mirror_sigma: float = 1.6
     fade_frames: float = 4.0
@@ -144,8 +148,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             check_range(self, name, 0.0, 1e6)
         check_range(self, "max_history_length", 1.0, 1e6)
         check_range(self, "min_cosine", -1.0, 1.0)
-        check_positive(self, "light_sigma", "visibility_sigma", "mirror_sigma", "fade_frames",
-                       "sigma_plane", "penumbra", "plane_tolerance")
+        check_positive(self, "light_sigma", "texture_sigma", "visibility_sigma", "mirror_sigma",
+                       "fade_frames", "sigma_plane", "penumbra", "plane_tolerance")
 
     @property
     def reach(self) -> int:
@@ -197,9 +201,11 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
                                             previous=without_images(frame))
 
     def _layout(self, light: Signals, has_shadow_rays: bool) -> SignalLayout:
-        return SignalLayout(light.kinds, light.groups, has_shadow_rays, self.innovation_levels,
-                            self.sharp_innovation_levels, self.output_levels,
-                            self.sharp_output_levels)
+        has_texture = light.texture.albedo is None and len(light.kinds) == 1
+        levels = min(self.innovation_levels, LEVELS) if has_texture else self.innovation_levels
+        return SignalLayout(light.kinds, light.groups, has_shadow_rays, levels,
+                            min(self.sharp_innovation_levels, levels), self.output_levels,
+                            self.sharp_output_levels, has_texture)
 
     def _tangent_plane(self, surface: Surface, zero_albedo: Bool | None,
                        stencil: Stencil) -> TangentPlane:
@@ -227,7 +233,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         change = {SignalKind.DIFFUSE: self.light_change, SignalKind.GLOSSY: self.glossy_change,
                   SignalKind.VISIBILITY: self.visibility_change}
         # Without visibility apart, diffuse light has the shadows in it, which are quick.
-        min_gain = self.min_gain if SignalKind.VISIBILITY in layout.kinds else 1.0
+        lags = SignalKind.VISIBILITY in layout.kinds or layout.has_texture
+        min_gain = self.min_gain if lags else 1.0
         return Gains([stencil.opaque(alpha) for alpha in alphas], stencil.opaque(min_gain),
                      stencil.opaque(self.noise_threshold), stencil.opaque(self.sharp_min_gain),
                      stencil.opaque(self.change_alpha), stencil.opaque(self.fade_frames),
@@ -236,4 +243,5 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     def _sigmas(self, stencil: Stencil, layout: SignalLayout) -> list[Float]:
         """As the exponents of the last filter want them."""
         return [stencil.opaque(math.sqrt(LOG2E) / sigma)
-                for sigma in layout.each(self.light_sigma, self.visibility_sigma)]
+                for sigma in layout.each(self.texture_sigma if layout.has_texture
+                                         else self.light_sigma, self.visibility_sigma)]

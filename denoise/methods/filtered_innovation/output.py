@@ -67,11 +67,13 @@ def output_level(layout: SignalLayout, level: int, values: Taps[list[NoisySignal
                 samples, w = samples + w, w * tap.samples
             totals[s] = totals[s] + w
             sums[s] = NoisySignal(mapped(_weighted(w), tap.signal, sums[s].signal),
-                                  dr.fma(w * w, tap.variance, sums[s].variance), samples)
+                                  dr.fma(w * w, tap.variance, sums[s].variance), samples,
+                                  mapped(_weighted(w), tap.parts, sums[s].parts))
         values.next()
     norms = [1 / total for total in totals]
     return [NoisySignal(mapped(_times(norm), noisy.signal), noisy.variance * dr.square(norm),
-                        None if noisy.samples is None else total / noisy.samples)
+                        None if noisy.samples is None else total / noisy.samples,
+                        mapped(_times(norm), noisy.parts))
             for noisy, norm, total in zip(sums, norms, totals)]
 
 
@@ -101,7 +103,8 @@ class _Rule(NamedTuple):
 def _start(center: NoisySignal, h0: float) -> NoisySignal:
     """The sums with the pixel itself alone; of a sparse signal `samples` is the sum of weights."""
     if center.samples is None:
-        return NoisySignal(mapped(lambda v: v * h0, center.signal), center.variance * h0**2)
+        return NoisySignal(mapped(lambda v: v * h0, center.signal), center.variance * h0**2,
+                           None, mapped(lambda v: v * h0, center.parts))
     w = center.samples * h0
     return NoisySignal(mapped(lambda v: v * w, center.signal), center.variance * dr.square(w),
                        type(w)(h0))

@@ -25,6 +25,7 @@ from .merging import Merged, merge
 from .output import FEWEST_SAMPLES, OutputFalloff, output_level
 from .shadows import Shadows, follow_shadows, of_each_light
 from .smoothing import smooth_level
+from .texture import RESIDUAL_RULES, Residual, residual, restored
 
 _OUTSIDE = -1e15          # 1/z outside the image
 _ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH = range(3)  # planes of the surface
@@ -76,13 +77,17 @@ class Passes:
     smoothing: list[Level]
     merge: Step[..., Merged]
     output: list[Level]
+    residual: Step[..., Residual]
+    residual_smoothing: list[Level]
+    restore: Step[..., Signal]
     pack: Step[..., Float]
 
     @staticmethod
     def make(stencil: Stencil, layout: SignalLayout) -> Passes:
         surfaces = stencil.planes([-1.0, _OUTSIDE, _OUTSIDE])
         spread = [PlaneRule(SPREAD_LEVEL)] * (_SHADOW_PLANES * (layout.groups or 1))
-        buffer = stencil.planes([0.0] * max(len(layout.smoothing_rules), len(spread)))
+        buffer = stencil.planes([0.0] * max(len(layout.smoothing_rules), len(spread),
+                                            layout.output_planes(layout.output_level(0))))
 
         def smoothing(i: int) -> Level:
             rules = layout.smoothing_level(i)
@@ -108,6 +113,12 @@ class Passes:
             [smoothing(i) for i in range(layout.innovation_levels)],
             Step(lambda *a: merge(stencil, layout, *a)),
             [output(i) for i in range(layout.output_levels)],
+            Step(residual),
+            [Level.make(i, buffer, len(RESIDUAL_RULES), surfaces, _VALID_INVERSE_DEPTH,
+                        lambda *a: smooth_level(RESIDUAL_RULES, *a))
+             for i in range(layout.innovation_levels)]
+            if layout.has_texture else [],
+            Step(restored),
             Step(lambda *a: pack_history(stencil, layout, *a)))
 
     def store_surface(self, id_: Float, plane: TangentPlane) -> None:
@@ -139,9 +150,15 @@ class Passes:
         """The last filter of each signal; narrower: of `narrowed`."""
         falloff = OutputFalloff(merged.fades, merged.sparse_fades, innovations.footprint_falloffs,
                                 narrower)
-        filtered = self._through(self.output, [_counted(noisy) for noisy in merged.signals], plane,
-                                 falloff, sigmas)
-        return [noisy.signal for noisy in filtered]
+        before = [_counted(noisy) for noisy in merged.signals]
+        if merged.parts is not None:
+            before = [before[0]._replace(parts=merged.parts)]
+        filtered = self._through(self.output, before, plane, falloff, sigmas)
+        if merged.parts is None:
+            return [noisy.signal for noisy in filtered]
+        around = self._through(self.residual_smoothing, self.residual(before[0], filtered[0]),
+                               plane)
+        return [self.restore(before[0], filtered[0], around, innovations.lengths[0])]
 
     def _through(self, levels: list[Level], values: T, plane: TangentPlane,
                  *arguments: Any) -> T:

@@ -194,7 +194,7 @@ def accumulate(stencil: Stencil, light: Color, surface: SurfaceSample, motion: M
                records: Float, alpha: Float, tests: ReprojectionTests) -> Accumulated:
     """Blend the frame's light with its history."""
     place = locate(stencil, surface, motion, tests.plane_tolerance)
-    values, is_valid = look_up(stencil, place, records, _VALUES, tests.min_cosine)
+    values, is_valid, _ = look_up(stencil, place, records, _VALUES, tests.min_cosine)
     length = dr.select(is_valid, dr.minimum(values[0] + 1, _LONGEST), 1)
     mixed = _blended(light, values[1:4], length, alpha)
     result = Accumulated(length, mixed, Color(*values[4:]))

@@ -156,7 +156,7 @@ def follow_light(stencil: Stencil, sought: Sought, found: LookUp, known: Known) 
         found: where the surface was; 11 values or, with specular light, 16.
     """
     surface, motion, place, records, tests = sought
-    values, is_valid = found
+    values, is_valid, _ = found
     words = record_words(len(values))
 
     def along(at: Any, active: Bool) -> LookUp:
