@@ -82,7 +82,7 @@ def color_of(frame: Frame, signals: dict[str, np.ndarray]) -> np.ndarray:
 
 def kind_of(frame: Frame) -> np.ndarray:
     """Background, lamps and the rest: only like pixels mix."""
-    black = (frame["albedo"] < 0.01).all(-1)
+    black = "albedo" in frame and (frame["albedo"] < 0.01).all(-1)
     return np.where(frame["id"] < 0, 0, np.where(black, 1, 2))
 
 
@@ -140,7 +140,7 @@ def spread(frame: Frame, energy: np.ndarray, counts: np.ndarray, levels: int, m,
 def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, sigma: np.ndarray,
            fade: np.ndarray, narrow: np.ndarray, m, counts: np.ndarray | None = None) -> np.ndarray:
     """The last filter; its last level's taps are weaker by `fade`, all by exp(-narrow r^2), and a
-    pixel weighs as much as it counts."""
+    pixel weighs as much as it counts. It compares the first three components, or the only one."""
     shape = frame["id"].shape
     counts = np.ones(shape) if counts is None else counts
     for i in range(levels):
@@ -156,7 +156,7 @@ def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, s
                     continue
                 w = geometry(p, q, dy, dx, m)
                 if dy or dx:
-                    deviations = (lum(q.x) - lum(p.x)) / (np.sqrt(p.v) + 1e-6)
+                    deviations = (lum(q.x[..., :3]) - lum(p.x[..., :3])) / (np.sqrt(p.v) + 1e-6)
                     w = w * p.fade * np.exp(-(deviations / p.sigma) ** 2
                                             - p.narrow * (dy * dy + dx * dx) * 4**i)
                 alike[where] += w
