@@ -78,7 +78,7 @@ def last_filter(frame: Frame, d: np.ndarray, h: np.ndarray, acc: np.ndarray, s2:
                np.zeros(shape), m)
     r_d, r_h = lum(d) - f[..., 3], lum(h) - f[..., 4]
     square = lum(acc - f[..., :3]) ** 2
-    u = 1 / (4 * s2 + square + 1e-12)
+    u = 1 / (2 * s2 + square + np.abs(r_d * r_h) + 1e-12)
     common, every = np.moveaxis(smooth(frame, np.stack([u * r_d * r_h, u * square], -1), found,
                                        levels, m), -1, 0)
     share = np.where(found, np.clip(common / np.maximum(every, 1e-12), 0, 1), 0)

@@ -21,7 +21,7 @@ each other. With r_d = l(d - F d), r_h = l(h - F h), both by the weights of F of
 r = l(acc - F acc), smoothed over pixels with a history, each by its weight u,
 
     out = F acc + c (acc - F acc),   c = clamp(S[u r_d r_h] / S[u r^2], 0, 1),
-    u = 1 / (4 s^2 + r^2),
+    u = 1 / (2 s^2 + r^2 + |r_d r_h|),
 
 so that a texture too weak to be seen in a pixel is found in many, while a lone edge, u, does not
 tell its surroundings to keep their noise. It is the Wiener filter of the residual, with the
@@ -54,7 +54,7 @@ from .layout import NoisySignal, Pair, PlaneRule
 MISS = 2.5                     # kappa
 LEVELS = 4                     # of the smoothings of the innovation and of residuals
 RESIDUAL_RULES = (PlaneRule(LEVELS),) * 2
-_EDGE = 4.0                    # s^2 from which on a residual counts less
+_EDGE = 2.0                    # s^2 from which on a residual counts less
 _LEAST = 1e-12
 
 
@@ -90,9 +90,9 @@ def residual(before: NoisySignal, after: NoisySignal) -> Residual:
     assert before.parts is not None
     assert after.parts is not None
     current, history = (b - f for b, f in zip(before.parts, after.parts))
-    square = dr.square(before.signal.luminance - after.signal.luminance)
-    u = 1 / (dr.fma(before.variance, _EDGE, square) + _LEAST)
-    return Residual(u * current * history, u * square)
+    square, product = dr.square(before.signal.luminance - after.signal.luminance), current * history
+    u = 1 / (dr.fma(before.variance, _EDGE, square) + dr.abs(product) + _LEAST)
+    return Residual(u * product, u * square)
 
 
 def restored(before: NoisySignal, after: NoisySignal, around: Residual, length: Float) -> Signal:
