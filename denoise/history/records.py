@@ -104,7 +104,7 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
         fallback: take the mean around, see the module's header.
         active: mask of the pixels that ask, if they are few; the others get no history.
         words: of a record, see `record_words`.
-        scattered: of which value the scatter is wanted; not with `fallback` or `active`.
+        scattered: of which value the scatter is wanted; not with `fallback`.
     Returns:
         values that are 0 where there is no history.
     """
@@ -129,21 +129,21 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
     def corner(dy: Any, dx: Any) -> tuple[Float, list[Float]]:
         values, passes = tap(int_t(left) + dx, int_t(top) + dy)
         weight = dr.abs(fx + (float_t(dx) - 1)) * dr.abs(fy + (float_t(dy) - 1))
-        return dr.select(passes, weight, 0), values
+        weight = dr.select(passes, weight, 0)
+        if scattered is not None:
+            values = [*values, dr.square(values[scattered]), weight]
+        return weight, values
 
-    squares = weights2 = float_t(0)
+    wanted = count + 2 * (scattered is not None)
     if active is None:
-        sums, total = [float_t(0)] * count, float_t(0)
+        sums, total = [float_t(0)] * wanted, float_t(0)
         for dy in (0, 1):
             for dx in (0, 1):
                 weight, values = corner(dy, dx)
                 sums = [dr.fma(weight, v, s) for v, s in zip(values, sums)]
                 total += weight
-                if scattered is not None:
-                    squares = dr.fma(weight, dr.square(values[scattered]), squares)
-                    weights2 = dr.fma(weight, weight, weights2)
     else:
-        total, sums = weighted_sums(stencil, active & place.inside, 4, count,
+        total, sums = weighted_sums(stencil, active & place.inside, 4, wanted,
                                     lambda i: corner(i >> 1, i & 1))
     if fallback:
         lacking = place.inside & (total < LEAST_WEIGHT)
@@ -161,5 +161,6 @@ def look_up(stencil: Stencil, place: Place, records: Float, count: int, min_cosi
     values = [s * scale for s in sums]
     if scattered is None:
         return LookUp(values, found)
-    variance = dr.fma(squares, scale, -dr.square(values[scattered]))
-    return LookUp(values, found, Scatter(variance, weights2 * dr.square(scale)))
+    *values, mean_square, mean_weight = values
+    variance = mean_square - dr.square(values[scattered])
+    return LookUp(values, found, Scatter(variance, mean_weight * scale))

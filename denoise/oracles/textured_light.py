@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from onespp.render.frame import Frame
@@ -16,6 +18,7 @@ from .filtered_innovation import (
     spatial_variance,
     spread,
 )
+from .filters import previous_screen
 
 
 def run(frames: list[Frame], m) -> np.ndarray:
@@ -28,9 +31,8 @@ def run(frames: list[Frame], m) -> np.ndarray:
         found = np.zeros(shape, bool)
         h, s2, n, raw = np.zeros_like(d), np.zeros(shape), np.ones(shape), np.zeros(shape)
         if previous is not None:
-            (h, s2, n, squares, concentration), found = history(previous, frame, kept, m)
+            (h, s2, n, raw), found = better_history(previous, frame, kept, m)
             n = np.where(found, np.minimum(n + 1, m.max_history_length), 1)
-            raw = np.where(found, squares - lum(h) ** 2 - (1 - concentration) * s2, 0)
         e = np.where(found[..., None], d - h, 0)
         wide = smooth(frame, e, found, levels, m)
         q = spread(frame, lum(e) ** 2, found, levels, m, np.zeros(shape))
@@ -54,8 +56,31 @@ def run(frames: list[Frame], m) -> np.ndarray:
     return repaid(out, frames[-1]["id"])
 
 
+def better_history(previous: Frame, frame: Frame, kept: np.ndarray, m) -> tuple:
+    """`history` of the surface, or of the place where that says better what is seen."""
+    of_surface, found = history(previous, frame, kept, m)
+    still = replace(previous, world_from_object=frame.world_from_object)
+    of_place, there = history(still, frame, kept, m)
+    there &= found & (np.abs(previous_screen(previous, frame) - previous_screen(still, frame))
+                      [..., :2].sum(-1) > 0.05)
+    ids = np.maximum(frame["id"], 0)
+    turns = np.array([before[:3, :3] @ np.linalg.inv(now[:3, :3]) for before, now in zip(
+        previous.world_from_object, frame.world_from_object)])[ids]
+    n = frame["normal"].astype(float)
+    n /= np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-9)
+    turn = 1 - np.einsum("hwi,hwij,hwj->hw", n, turns, n)  # objects here do not change shape
+    share = 0.7 + 0.6 * np.clip(turn / 0.015, 0, 1)
+    d = frame["color"].astype(float)
+    e2, place_e2 = (lum(d - values[0]) ** 2 for values in (of_surface, of_place))
+    excess = np.where(there, place_e2 - share * e2, 0)
+    better = there & (smooth(frame, excess[..., None], found, min(3, m.innovation_levels), m)
+                      [..., 0] < 0)
+    return tuple(np.where(better.reshape(better.shape + (1,) * (a.ndim - 2)), b, a)
+                 for a, b in zip(of_surface, of_place)), found
+
+
 def history(previous: Frame, frame: Frame, kept: np.ndarray, m) -> tuple:
-    """(h, s^2, n, mean of the taps' l^2, sum w^2) and where there is one.
+    """(h, s^2, n, what the taps differ by less their noise) and where there is one.
 
     The weight of a tap is how much of it an image holds that is 1 there alone: of the four around
     a place, no two have row and column even or odd alike.
@@ -64,8 +89,9 @@ def history(previous: Frame, frame: Frame, kept: np.ndarray, m) -> tuple:
     alone = [(rows % 2 == y) & (columns % 2 == x) for y in (0, 1) for x in (0, 1)]
     image = np.concatenate([kept, lum(kept[..., :3])[..., None] ** 2, np.stack(alone, -1)], -1)
     values, found = look_up(previous, frame, image, m)
-    return (values[..., :3], values[..., 3], values[..., 4], values[..., 5],
-            np.square(values[..., 6:]).sum(-1)), found
+    h, s2 = values[..., :3], values[..., 3]
+    differ = values[..., 5] - lum(h) ** 2 - (1 - np.square(values[..., 6:]).sum(-1)) * s2
+    return (h, s2, values[..., 4], np.where(found, differ, 0)), found
 
 
 def last_filter(frame: Frame, d: np.ndarray, h: np.ndarray, acc: np.ndarray, s2: np.ndarray,

@@ -69,18 +69,19 @@ from onespp.denoise.filters.penumbra import footprint_falloff
 from onespp.denoise.history.records import look_up, pack_records, record_words
 from onespp.denoise.history.reflections import Lobes, turned
 from onespp.denoise.history.reprojection import Motion, ReprojectionTests, locate
-from onespp.denoise.history.shadow_motion import MIN_SHARE, look_up_shadow
+from onespp.denoise.history.shadow_motion import MIN_MOTION, MIN_SHARE, look_up_shadow
 from onespp.denoise.inputs.signals import Chosen, Signal
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import mapped
+from onespp.denoise.jit.vector import dot
 
 from .layout import LUMINANCE_PLACE, History, SignalLayout, Smoothed
 from .noise import MAX_ENERGY
 from .output import FEWEST_SAMPLES
 from .shadows import Shadows
-from .texture import missed
+from .texture import AtRest, FromHistory, choose, found_at_rest, missed
 
 _TIE = 1e-6                    # excess of a history that is no better nor worse
 _NO_HISTORY = -3e14            # 1/z of a pixel without history
@@ -115,7 +116,7 @@ class Innovations(NamedTuple):
         shadows: of the other history of each visibility that has one. footprint_falloffs: of
             `penumbra.py`, of each of those. sparse: of each sparse signal. turned: t of
             `reflections.py`, None where the lobes of glossy light are not known.
-        misses: what reprojection may miss of texture, see `texture.py`.
+        misses: what reprojection may miss of texture, see `texture.py`; at_rest: of that module.
     """
 
     signals: list[Signal]
@@ -128,19 +129,21 @@ class Innovations(NamedTuple):
     sparse: list[SparseHistory]
     turned: Float | None
     misses: Float | None = None
+    at_rest: AtRest | None = None
 
 
 def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signal],
                      chosen: Chosen | None, surface: SurfaceSample, plane: TangentPlane,
                      motion: Motion, records: Float, shadows: list[Shadows],
                      tests: ReprojectionTests, max_history_length: Float,
-                     falloff_scale: Float, lobes: Lobes | None) -> Innovations:
+                     falloff_scale: Float, lobes: Lobes | None,
+                     rest: Motion | None) -> Innovations:
     """The innovation of each signal.
 
     Args:
         motion: of `motion_between`. records: of `pack_history`.
         shadows: of `follow_shadows`, smoothed. falloff_scale: of `penumbra.footprint_falloff`.
-        lobes: of `reflections.lobes_between`.
+        lobes: of `reflections.lobes_between`. rest: of `texture.at_rest_between`.
     """
     place = locate(stencil, surface, motion, tests.plane_tolerance)
     record_words_ = record_words(layout.record_values)
@@ -163,6 +166,15 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
     variances = [old.variance for old in history]
     lengths = [dr.select(is_valid, dr.minimum(n + 1, max_history_length), 1) for n in lengths]
     valid_inverse_depth = dr.select(is_valid, plane.inverse_depth, _NO_HISTORY)
+    misses, at_rest = None if scatter is None else missed(scatter, variances[0]), None
+    if misses is not None and rest is not None:
+        there = locate(stencil, surface, rest, tests.plane_tolerance)
+        moves = is_valid & (dr.abs(there.x - place.x) + dr.abs(there.y - place.y) > MIN_MOTION)
+        other = look_up(stencil, there, records, layout.record_values, tests.min_cosine,
+                        active=moves, words=record_words_, scattered=LUMINANCE_PLACE)
+        found = FromHistory(e[0], variances[0], lengths[0], misses)
+        at_rest = found_at_rest(layout, signals[0], other, found, max_history_length, moves,
+                                1 - dot(place.normal, there.normal))
     others = []
     for f, shadow in enumerate(shadows):
         s = len(signals) - len(shadows) + f
@@ -179,14 +191,19 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
     return Innovations(e, energies, lengths, variances, valid_inverse_depth, others,
                        [footprint_falloff(shadow.penumbra, falloff_scale, MIN_SHARE)
                         for shadow in shadows], sparse,
-                       None if lobes is None else turned(lobes, surface.normal, place),
-                       None if scatter is None else missed(scatter, variances[0]))
+                       None if lobes is None else turned(lobes, surface.normal, place), misses,
+                       at_rest)
 
 
 def choose_histories(layout: SignalLayout, innovations: Innovations,
                      excess: list[Float]) -> Innovations:
     """With its shadow history in the place of the other one where that of a sparse signal is
-    better; excess: of each, smoothed."""
+    better, or that of the place where that of light with texture is; excess: of each, smoothed."""
+    if innovations.at_rest is not None:
+        e, variance, length, misses = choose(innovations.at_rest, excess[0])
+        energy = dr.minimum(dr.square(e.luminance), MAX_ENERGY)
+        return innovations._replace(signals=[e], energies=[energy], lengths=[length],
+                                    variances=[variance], misses=misses, at_rest=None)
     signals, energies = list(innovations.signals), list(innovations.energies)
     variances, sparse = list(innovations.variances), list(innovations.sparse)
     for g, (shadow, more) in enumerate(zip(innovations.shadows, excess, strict=True)):

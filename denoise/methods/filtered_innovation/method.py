@@ -46,7 +46,7 @@ from .layout import ENERGY_LEVELS, History, SignalLayout
 from .merging import Gains
 from .output import narrowed
 from .passes import Passes
-from .texture import LEVELS
+from .texture import LEVELS, at_rest_between
 
 _LAMP = 2 * BACKGROUND    # 1/z where albedo is 0: far from any plane, and from background
 _BACKGROUND_SCALE = 1e3   # |k| / sigma_plane of background and lamps: only their like counts
@@ -188,7 +188,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         shadows = passes.spread_shadows(rays, sample, surface.position, plane, chosen)
         innovations = passes.find_innovations(
             signals, chosen, sample, plane, motion, records, shadows,
-            *self._reprojection_parameters(stencil), lobes)
+            *self._reprojection_parameters(stencil), lobes,
+            at_rest_between(previous, frame, stencil) if layout.has_texture else None)
         innovations = passes.choose_histories(innovations, plane)
         smoothed = passes.smooth_innovations(innovations, plane)
         merged = passes.merge(signals, innovations, chosen, smoothed, plane,

@@ -25,7 +25,7 @@ from .merging import Merged, merge
 from .output import FEWEST_SAMPLES, OutputFalloff, output_level
 from .shadows import Shadows, follow_shadows, of_each_light
 from .smoothing import smooth_level
-from .texture import RESIDUAL_RULES, Residual, residual, restored
+from .texture import CHOICE_RULES, RESIDUAL_RULES, Residual, residual, restored
 
 _OUTSIDE = -1e15          # 1/z outside the image
 _ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH = range(3)  # planes of the surface
@@ -72,7 +72,7 @@ class Passes:
     follow_shadows: Step[..., list[Shadows]]
     spread: Level
     find_innovations: Step[..., Innovations]
-    choice: Level | None
+    choice: list[Level]
     choose: Step[..., Innovations]
     smoothing: list[Level]
     merge: Step[..., Merged]
@@ -99,6 +99,15 @@ class Passes:
             return Level.make(i, buffer, layout.output_planes(left), surfaces, _INVERSE_DEPTH,
                               lambda *a: output_level(layout, i, *a), layout.noisy_signals(left))
 
+        choice: list[Level] = []
+        if layout.groups and layout.has_shadow_rays:
+            choice = [Level.make(SPREAD_LEVEL, buffer, layout.groups, surfaces,
+                                 _VALID_INVERSE_DEPTH,
+                                 lambda *a: smooth_level(spread[:layout.groups], *a))]
+        elif layout.has_texture:
+            choice = [Level.make(i, buffer, len(CHOICE_RULES), surfaces, _VALID_INVERSE_DEPTH,
+                                 lambda *a: smooth_level(CHOICE_RULES, *a))
+                      for i in range(min(CHOICE_RULES[0].levels, layout.innovation_levels))]
         return Passes(
             stencil, layout, surfaces, buffer,
             Step(lambda chosen, *a: of_each_light(follow_shadows(stencil, *a), chosen,
@@ -106,9 +115,7 @@ class Passes:
             Level.make(SPREAD_LEVEL, buffer, len(spread), surfaces, _INVERSE_DEPTH,
                        lambda *a: smooth_level(spread, *a)),
             Step(lambda *a: find_innovations(stencil, layout, *a)),
-            Level.make(SPREAD_LEVEL, buffer, layout.groups, surfaces, _VALID_INVERSE_DEPTH,
-                       lambda *a: smooth_level(spread[:layout.groups], *a))
-            if layout.groups and layout.has_shadow_rays else None,
+            choice,
             Step(lambda *a: choose_histories(layout, *a)),
             [smoothing(i) for i in range(layout.innovation_levels)],
             Step(lambda *a: merge(stencil, layout, *a)),
@@ -133,12 +140,15 @@ class Passes:
                              plane)
 
     def choose_histories(self, innovations: Innovations, plane: TangentPlane) -> Innovations:
-        """With the better one of the two histories of each sparse signal; first of what follows."""
+        """With the better one of the two histories of each sparse signal, or of light with texture;
+        first of what follows."""
         self.surfaces.store(innovations.valid_inverse_depth, first=_VALID_INVERSE_DEPTH)
-        if self.choice is None:
-            return innovations
         excess = [shadow.excess for shadow in innovations.shadows]
-        return self.choose(innovations, self._through([self.choice], excess, plane))
+        if innovations.at_rest is not None:
+            excess = [innovations.at_rest.excess]
+        if not (self.choice and excess):
+            return innovations
+        return self.choose(innovations, self._through(self.choice, excess, plane))
 
     def smooth_innovations(self, innovations: Innovations, plane: TangentPlane) -> Smoothed:
         """Q, S and W of the innovation, over pixels that have a history."""
