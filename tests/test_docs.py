@@ -153,11 +153,11 @@ def test_a_circle_is_found_and_drawn_as_wrong(house):
     found = draw_architecture.rooms(house)
     assert ("render^", "scenes") in draw_architecture.circles(found)
     assert draw_architecture.svg(found).count(" wrong") == 3
-    assert " wrong" not in draw_architecture.svg(draw_architecture.rooms(ROOT))
+    assert " wrong" not in draw_architecture.svg(rooms_of_ours())
 
 
 def test_arrows_go_down_and_rooms_do_not_overlap(house):
-    for found in (draw_architecture.rooms(house), draw_architecture.rooms(ROOT)):
+    for found in (draw_architecture.rooms(house), rooms_of_ours()):
         level = draw_architecture.layers(found)
         assert all(level[key] > level[below] for key, room in found.items() for below in room.below)
         rows, x, _ = draw_architecture.arrange(found)
@@ -180,6 +180,11 @@ def test_links_of_the_sources_lead_to_files_and_headings(page):
             other = path if not file else path.parent / file
             assert other.is_file(), f"{page} -> {target}"
             assert not anchor or anchor in slugs(other), f"{page} -> {target}"
+
+
+@cache
+def rooms_of_ours() -> dict:
+    return draw_architecture.rooms(ROOT)
 
 
 @cache

@@ -28,8 +28,8 @@ SCORE, COMPARE = "score {} --no-pictures", "compare {0}/{1} {0}/{1}"
 
 
 @pytest.mark.parametrize(("words", "redirection"), [
-    (SCORE, ">&-"), (SCORE, "2>&-"), (SCORE, ">&- 2>&-"), (SCORE, "<&- >&- 2>&-"),
-    (SCORE, "| true"), (SCORE, "2>&1 | true"), (COMPARE, "2>&1 | true"),
+    (SCORE, ">&-"), (SCORE, "2>&-"), (SCORE, "<&- >&- 2>&-"), (SCORE, "2>&1 | true"),
+    (COMPARE, "2>&1 | true"),
     pytest.param(SCORE, "2>/dev/full", marks=pytest.mark.skipif(
         not os.path.exists("/dev/full"), reason="no device that is always full"))])
 def test_a_closed_stream_ends_no_job(folder, words, redirection):
@@ -50,7 +50,7 @@ def test_a_closed_stream_does_not_end_a_job_halfway(tmp_path):
     assert (tmp_path / "a/scores.json").exists()
 
 
-@pytest.mark.parametrize("redirection", [">&-", "2>&-", "| true", "2>&1 | true"])
+@pytest.mark.parametrize("redirection", ["2>&-", "2>&1 | true"])
 def test_bad_input_still_says_so_by_its_exit_code(redirection, tmp_path):
     done = shell(f"score {tmp_path / 'none'}", redirection)
     assert done.returncode == 2

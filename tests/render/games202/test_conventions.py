@@ -175,7 +175,9 @@ def test_our_convention_passes_however_it_is_stored(frame, store):
     check_frame(frame)
 
 
-@pytest.mark.parametrize("name", [*catalog.SCENES, *(f"hard/{n}" for n in HARD)])
+@pytest.mark.parametrize("name", [
+    pytest.param(name, marks=[pytest.mark.slow] if k % 4 else [])
+    for k, name in enumerate([*catalog.SCENES, *(f"hard/{n}" for n in HARD)])])
 def test_every_scene_of_ours_passes_exported_and_imported(tmp_path, name):
     scene = catalog.load(name)
     job = RenderJob(scene, (4, 5, 6), 64, 96, direct="mis", sampler="pcg",
