@@ -259,7 +259,7 @@ def _mean_motion(before: Matrices, now: Matrices, depth: np.ndarray, id: np.ndar
                  corner: tuple[int, int], crop: tuple[int, int]) -> np.ndarray:
     """(rows, columns) of what a crop shows; 0 at a cut, where nothing is followed."""
     (y, x), (h, w) = corner, crop
-    motion = motion_in_pixels(before, now, depth[y:y + h, x:x + w], id[y:y + h, x:x + w],
-                              (y, x))[::_EVERY, ::_EVERY]
+    some = slice(y, y + h, _EVERY), slice(x, x + w, _EVERY)
+    motion = motion_in_pixels(before, now, depth[some], id[some], (y, x), _EVERY)
     mean = motion.mean(axis=(0, 1), dtype=np.float64)[::-1]
     return mean if (np.abs(mean) < np.divide(crop, 2)).all() else np.zeros(2)

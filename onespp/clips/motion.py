@@ -25,17 +25,18 @@ class Matrices:
 
 
 def motion_in_pixels(before: Matrices, now: Matrices, depth: np.ndarray, id: np.ndarray,
-                     origin: tuple[int, int] = (0, 0)) -> np.ndarray:
+                     origin: tuple[int, int] = (0, 0), step: int = 1) -> np.ndarray:
     """(h, w, 2) float32 from each pixel's centre to where its surface was, x right and y down.
 
     0 where that cannot be told: behind the camera, or of an object that had no size.
 
     Args:
         depth, id: (h, w). origin: row and column of their first pixel on the matrices' screen.
+        step: of that many pixels each of them is the first.
     """
     s, s_before = (m.screen_from_world[[0, 1, 3]] for m in (now, before))
     world_from_screen = np.linalg.inv(s[:, :3])
-    y, x = np.indices(depth.shape) + 0.5
+    y, x = step * np.indices(depth.shape) + 0.5
     u = np.stack([x + origin[1], y + origin[0], np.ones_like(x)], axis=-1)
     surface = (id >= 0) & (depth > 0)
     seen = u @ (s_before[:, :3] @ world_from_screen).T
