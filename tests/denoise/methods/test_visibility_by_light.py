@@ -143,10 +143,10 @@ def test_frames_are_one_recording():
     _, state = run(FilteredInnovation(), frames)
     passes = state.passes
     assert passes is not None
-    assert passes.choice is not None
+    assert passes.choice
     steps = [passes.follow_shadows, passes.find_innovations, passes.choose, passes.merge,
              passes.pack,
-             *(level.step for level in (passes.spread, passes.choice, *passes.smoothing,
+             *(level.step for level in (passes.spread, *passes.choice, *passes.smoothing,
                                      *passes.output))]
     assert [step.recordings for step in steps] == [1] * len(steps)
     assert compiled(lambda: run(FilteredInnovation(light_alpha=0.1), frames)) == 0
