@@ -78,7 +78,7 @@ from onespp.denoise.jit.structure import mapped
 from onespp.denoise.jit.vector import dot
 
 from .layout import LUMINANCE_PLACE, History, SignalLayout, Smoothed
-from .noise import MAX_ENERGY
+from .noise import MAX_ENERGY, spatial_variances
 from .output import FEWEST_SAMPLES
 from .shadows import Shadows
 from .texture import AtRest, FromHistory, choose, found_at_rest, missed
@@ -116,7 +116,8 @@ class Innovations(NamedTuple):
         shadows: of the other history of each visibility that has one. footprint_falloffs: of
             `penumbra.py`, of each of those. sparse: of each sparse signal. turned: t of
             `reflections.py`, None where the lobes of glossy light are not known.
-        misses: what reprojection may miss of texture, see `texture.py`; at_rest: of that module.
+        misses: what reprojection may miss of texture, see `texture.py`; at_rest: of that module;
+            spatial: of `noise.py`, of such light.
     """
 
     signals: list[Signal]
@@ -130,6 +131,7 @@ class Innovations(NamedTuple):
     turned: Float | None
     misses: Float | None = None
     at_rest: AtRest | None = None
+    spatial: Float | None = None
 
 
 def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signal],
@@ -166,7 +168,10 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
     variances = [old.variance for old in history]
     lengths = [dr.select(is_valid, dr.minimum(n + 1, max_history_length), 1) for n in lengths]
     valid_inverse_depth = dr.select(is_valid, plane.inverse_depth, _NO_HISTORY)
-    misses, at_rest = None if scatter is None else missed(scatter, variances[0]), None
+    misses, at_rest, spatial = None, None, None
+    if scatter is not None:
+        misses = missed(scatter, variances[0])
+        (spatial,) = spatial_variances(stencil, signals, is_valid | ~is_valid, plane, [])
     if misses is not None and rest is not None:
         there = locate(stencil, surface, rest, tests.plane_tolerance)
         moves = is_valid & (dr.abs(there.x - place.x) + dr.abs(there.y - place.y) > MIN_MOTION)
@@ -192,7 +197,7 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
                        [footprint_falloff(shadow.penumbra, falloff_scale, MIN_SHARE)
                         for shadow in shadows], sparse,
                        None if lobes is None else turned(lobes, surface.normal, place), misses,
-                       at_rest)
+                       at_rest, spatial)
 
 
 def choose_histories(layout: SignalLayout, innovations: Innovations,
@@ -237,7 +242,8 @@ def to_smooth(layout: SignalLayout, innovations: Innovations) -> Smoothed:
         visibility_spread=[innovations.energies[s] for s in layout.visibilities], sharp=sharp,
         shadow_innovation=[shadow.innovation for shadow in innovations.shadows],
         weights=[sparse.weight for sparse in innovations.sparse],
-        energies=innovations.energies[:dense], misses=innovations.misses)
+        energies=innovations.energies[:dense], misses=innovations.misses,
+        spatial=innovations.spatial)
 
 
 def pack_history(stencil: Stencil, layout: SignalLayout, surface: SurfaceSample, history: History,

@@ -65,7 +65,8 @@ class Smoothed(NamedTuple):
         visibility_spread: Q of each visibility. sharp: S[e] of glossy light and of visibility.
         shadow_innovation: S[e] of each of those histories. weights: S[omega] of each sparse signal.
         energies: W[l(e)^2] of each signal that is not sparse.
-        misses: of light with texture, W of what reprojection may miss, see `texture.py`.
+        misses, spatial: of light with texture, W of what reprojection may miss, and of the noise
+            that a frame by itself may have, see `texture.py`.
     """
 
     diffuse_spread: Float
@@ -77,6 +78,7 @@ class Smoothed(NamedTuple):
     weights: list[Float]
     energies: list[Float]
     misses: Float | None = None
+    spatial: Float | None = None
 
     @property
     def each(self) -> list[Signal]:
@@ -165,7 +167,8 @@ class SignalLayout:
             shadow_innovation=chosen,
             weights=visible[len(visible) - self.groups:],
             energies=[rule(ENERGY_LEVELS)] * (len(self.kinds) - self.groups),
-            misses=rule(ENERGY_LEVELS) if self.has_texture else None))
+            misses=rule(ENERGY_LEVELS) if self.has_texture else None,
+            spatial=rule(ENERGY_LEVELS) if self.has_texture else None))
 
     def smoothing_level(self, level: int) -> list[PlaneRule]:
         """Rules of the planes that are left at a level, the first so many."""

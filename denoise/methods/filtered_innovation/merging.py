@@ -85,7 +85,8 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
     asks = is_new
     for renewed in is_renewed:
         asks = asks | renewed
-    spatial = spatial_variances(stencil, [signals[s] for s in dense], asks, plane, first)
+    spatial = ([innovations.spatial] if innovations.spatial is not None else
+               spatial_variances(stencil, [signals[s] for s in dense], asks, plane, first))
     visible = dict(zip(layout.visibilities, smoothed.visibility_spread, strict=True))
     merged, sparse_fades = [], []
 
@@ -112,12 +113,14 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
         if omega is None:
             a = dr.maximum(1 / lengths[layout.length(s)], alpha)
             energy = smoothed.energies[s]
-            if smoothed.misses is None:
+            if smoothed.misses is None or smoothed.spatial is None:
                 noise = estimated(dr.maximum(energy - variance, energy * MIN_NOISE), energy, s)
             else:
-                error = error_of_history(smoothed.misses, energy)
-                noise = estimated(dr.maximum(energy - variance - error, energy * MIN_NOISE),
-                                  energy, s)
+                most = dr.maximum(spatial[s], smoothed.spatial)
+                error = error_of_history(smoothed.misses, energy, energy - variance - most)
+                error = dr.select(is_new, 0, error)
+                noise = dr.maximum(energy - variance - error, energy * MIN_NOISE)
+                noise = estimated(dr.minimum(noise, most), energy, s)
                 a = dr.maximum(a, renewal(error, noise))
                 lengths[layout.length(s)] = dr.minimum(lengths[layout.length(s)], 1 / a)
             merged_signal = mapped(_merged(dr.maximum(gain, a), a), signal, e, wide)

@@ -11,8 +11,13 @@ weights of the taps, which add up to 1,
     m = min(kappa W[sum w l(h_i)^2 - l(h)^2 - (1 - sum w^2) s^2]+, W[l(e)^2])
 
 is how far the taps differ by more than their noise: the mean square of what reprojection misses.
-It is no noise of d, s_0^2 <- max(W[l(e)^2] - s^2 - m, W[l(e)^2] / 4), and a history that misses
-much is worth little:
+What a mirror shows moves otherwise than it does. There a frame is smooth where history is not that
+of it: with z the greater of the frame's own spatial variance (`noise.py`) and W of it, which d's
+noise is not above,
+
+    m <- max(m, W[l(e)^2] - s^2 - z),   s_0^2 <- min(max(W[l(e)^2] - s^2 - m, W[l(e)^2] / 4), z),
+
+and a history that misses much is worth little:
 
     a <- max(a, m / (m + s_0^2)),   n <- min(n, 1 / a).
 
@@ -139,9 +144,9 @@ def choose(found: AtRest, excess: Float) -> FromHistory:
     return mapped(lambda a, b: dr.select(excess < 0, a, b), found.place, found.surface)
 
 
-def error_of_history(misses: Float, energy: Float) -> Float:
-    """m. misses: of `missed`, smoothed. energy: W[l(e)^2]."""
-    return dr.minimum(dr.maximum(misses, 0) * MISS, energy)
+def error_of_history(misses: Float, energy: Float, excess: Float) -> Float:
+    """m. misses: of `missed`, smoothed. energy: W[l(e)^2]. excess: W[l(e)^2] - s^2 - z."""
+    return dr.maximum(dr.minimum(dr.maximum(misses, 0) * MISS, energy), excess)
 
 
 def renewal(error: Float, noise: Float) -> Float:
