@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from onespp.denoise.catalog import METHODS, build
 from onespp.render.errors import InputError
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import FrameSequence
@@ -70,6 +69,8 @@ def import_frames(folder: str | Path, out: str | Path | None = None, *, layout: 
 
 def unfit_methods(sequence: FrameSequence) -> list[str]:
     """Which methods cannot run on a sequence's frames, and for want of what: sentences."""
+    from onespp.denoise.catalog import METHODS, build  # loads Dr.Jit
+
     lacking: dict[tuple[str, ...], list[str]] = {}
     for name in METHODS:
         missing = tuple(c for c in build(name).needs if c not in sequence.channels)

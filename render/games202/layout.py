@@ -105,7 +105,8 @@ def _suffix(stem: str) -> str:
 
 def has_matrices(folder: Path) -> bool:
     """Whether it has the assignment's matrices, by itself or in `input`; InputError: no folder."""
-    return any(numbered(place, "matrix") for place in (folder, *_inside((folder,), (_INPUT,))))
+    return bool(numbered(folder, "matrix")) or any(
+        numbered(place, "matrix") for place in _subfolders(folder, (_INPUT,)))
 
 
 def _has_frames(folder: Path) -> bool:

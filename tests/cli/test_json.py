@@ -14,7 +14,8 @@ from onespp.render.cli.figures import show_or_print
 from onespp.scenes.hard import HARD
 from tests.support.made_sequence import make_sequence
 
-WITHOUT = {"render", "denoise", "run", "report", "view", "import", "export", "new", "completion"}
+WITHOUT = {"dataset", "render", "denoise", "run", "report", "view", "import", "export", "new",
+           "completion"}
 """Commands whose outcome is files."""
 
 
