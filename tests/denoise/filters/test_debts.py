@@ -82,11 +82,11 @@ def test_what_is_not_finite_neither_pays_nor_spreads():
 
 
 def dimmed(count=10):
-    """A checked wall without albedo, whose light falls to three tenths, under noise."""
+    """A wall of one albedo under checked light that falls to three tenths, under noise."""
     wall = make_frame(48, 64, wall_end=1e9)
     y, x = np.mgrid[:48, :64] // 8
     checks = np.where(((y + x) % 2)[..., None] == 1, [0.8, 0.8, 0.8], [0.03, 0.03, 0.05])
-    images = {k: v for k, v in wall.images.items() if k != "albedo"}
+    images = {**wall.images, "albedo": np.ones((48, 64, 3), np.float32)}
     wall = Frame(0, images, wall.camera_from_world, wall.screen_from_world, wall.world_from_object)
     truth = [with_images(wall, color=checks * (1 if i < count // 2 else 0.3)) for i in range(count)]
     return [noisy(frame, i, sigma=0.7) for i, frame in enumerate(truth)], truth[-1]["color"]
