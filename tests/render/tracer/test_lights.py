@@ -39,7 +39,8 @@ def test_visibility_times_unshadowed_light_has_the_mean_of_direct_light(name):
     assert_same_mean(mean, variance + (0.03 * other) ** 2, other, other_variance)
 
 
-@pytest.mark.parametrize(("name", "gain"), [("box", 3), ("room", 4)])
+@pytest.mark.parametrize(("name", "gain"), [
+    ("box", 3), pytest.param("room", 4, marks=pytest.mark.slow)])
 def test_resampling_lowers_the_variance_of_direct_light(name, gain):
     variance = {direct: np.var([renderer.frame(2, seed, ("direct",))["direct"]
                                 for seed in range(20)], axis=0).mean()
