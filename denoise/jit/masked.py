@@ -39,9 +39,10 @@ def weighted_sums(stencil: Stencil, active: Bool, taps: int, count: int,
     return total, sums
 
 
-def tabulate(stencil: Stencil, words: Sequence[Float]) -> Float:
-    """The table of a window: numbers a lane, and zeros up to a multiple of `WORDS`."""
-    return stencil.pack([*words, *[stencil.Float(0)] * (-len(words) % WORDS)])
+def tabulate(stencil: Stencil, words: Sequence[Float], lanes: int | None = None) -> Float:
+    """Numbers a lane, and zeros up to a multiple of `WORDS`, as of a window's table. lanes: as of
+    `Stencil.pack`."""
+    return stencil.pack([*words, *[stencil.Float(0)] * (-len(words) % WORDS)], lanes)
 
 
 class WindowTap(NamedTuple):

@@ -33,7 +33,6 @@ _SIGNS = {
     "its direction turned round (--motion previous)": (-1, -1),
 }
 _RIGHTED: Mapping[str, Callable[[Frame], Frame]] = {
-    AS_IT_IS: lambda frame: frame,
     **{name: lambda frame, signs=signs: _with(frame, frame["motion"] * np.array(signs, np.float32))
        for name, signs in _SIGNS.items()},
     "x and y exchanged": lambda frame: _with(frame, frame["motion"][..., ::-1]),
@@ -87,14 +86,15 @@ def agreement(sequence: FrameSequence, progress: Progress = silent) -> Agreement
     pairs = list(pairwise(numbers))
     pairs = pairs[::-(-len(pairs) // MOST_PAIRS)]
     found: list[tuple[int, float]] = []
-    moved_found: dict[str, list[np.ndarray]] = {name: [] for name in _RIGHTED}
+    moved_found: dict[str, list[np.ndarray]] = {name: [] for name in (AS_IT_IS, *_RIGHTED)}
     for done, (a, b) in enumerate(pairs, 1):
         before, now = (sequence.read_frame(i, names) for i in (a, b))
-        shown = has_surface(now)
+        shown, there = has_surface(now), previous_pixel(before, now) != NOWHERE
         if shown.any():
-            found.append((b, float((previous_pixel(before, now)[shown] != NOWHERE).mean())))
+            found.append((b, float(there[shown].mean())))
         if "motion" in names:
             moved = shown & (np.abs(now["motion"]).max(-1) > _MOVED)
+            moved_found[AS_IT_IS].append(there[moved])
             for name, righted in _RIGHTED.items():
                 moved_found[name].append(previous_pixel(before, righted(now))[moved] != NOWHERE)
         progress(done, len(pairs), f"check {sequence.folder.name}")

@@ -72,15 +72,15 @@ def mean_psnr(method: Method, cases: list[Case]) -> float:
     """dB on clipped sRGB: mean over the frames of a case, then over cases."""
     means = []
     for case in cases:
-        state, plain, squares = method.init(case.frames[0].height, case.frames[0].width), [], []
+        state, images = method.init(case.frames[0].height, case.frames[0].width), []
         for frame, target in zip(case.frames, case.targets):
             image, state = method(frame, state)
-            images = pair(image, target)
-            if (estimate := display_error(images)) is None:
-                plain.append(psnr(*images.srgb))
-            else:
-                squares.append(estimate.without_noise())
-        means.append(mean_decibels(plain) if plain else number("dB", squares).value)
+            images.append(pair(image, target))
+        squares = [e.without_noise() for e in map(display_error, images) if e is not None]
+        if len(squares) == len(images):
+            means.append(number("dB", squares).value)
+        else:  # references of an older version among them: all against the mean
+            means.append(mean_decibels([psnr(*i.srgb) for i in images]))
     return fmean(means)
 
 

@@ -50,6 +50,11 @@ def import_frames(folder: str | Path, out: str | Path | None = None, *, layout: 
     if motion_from not in ("current", "previous"):
         raise InputError(f"motion_from is '{motion_from}': use current or previous")
     theirs = layout == "games202" or (layout == "auto" and not channels and has_matrices(folder))
+    conventions = Conventions(layout, channels or {}, fov, motion_from, motion_up)
+    if theirs and (reference is not None or conventions != Conventions(layout)):
+        raise InputError(f"{folder} is read in the assignment's layout, which says where channels, "
+                         "references and the camera are: leave options for them out, or give "
+                         "another --layout")
     out = Path(out) if out else Path("data") / (
         find_files(folder).name if theirs else sequence_name(folder))
     notes: list[str] = []
@@ -59,9 +64,8 @@ def import_frames(folder: str | Path, out: str | Path | None = None, *, layout: 
                                        command=caller().command(), tell=notes.append)
         else:
             sequence = import_foreign(
-                folder, out, Conventions(layout, channels or {}, fov, motion_from, motion_up),
-                reference=None if reference is None else Path(reference), fps=fps,
-                overwrite=overwrite, command=caller().command(), tell=notes.append)
+                folder, out, conventions, reference=None if reference is None else Path(reference),
+                fps=fps, overwrite=overwrite, command=caller().command(), tell=notes.append)
     for sentence in (*notes, *unfit_methods(sequence)):
         caller().inform(sentence)
     return sequence

@@ -100,9 +100,10 @@ class Clips:
         _check_count(frames, self.plan.frames, "frames")
         _check_count(seeds, self.plan.seeds, "seeds")
         self._store = Store(data, None if cache is None else Path(cache))
-        self._objects = max(len(data.sequence(n).manifest.objects) for n in self.numbers)
+        sequences = [data.sequence(n) for n in self.numbers]
+        self._objects = max(len(sequence.manifest.objects) for sequence in sequences)
         self._has_reference = bool(self.plan.reference_spp or self.plan.reference_error)
-        self._check_channels(data)
+        self._check_channels(data, set.intersection(*({*s.channels} for s in sequences)))
 
     def __len__(self) -> int:
         return len(self.numbers) * self._in_sequence
@@ -140,8 +141,8 @@ class Clips:
     def _in_sequence(self) -> int:
         return max(1, self.plan.frames // self.frames)
 
-    def _check_channels(self, data: DataSet) -> None:
-        there = set.intersection(*({*data.sequence(n).channels} for n in self.numbers))
+    def _check_channels(self, data: DataSet, there: set[str]) -> None:
+        """InputError where `there`, the channels that all sequences have, are too few."""
         needed = {*self.channels, "depth", "id"} - {MOTION}
         for name in (*self.channels, *sorted(needed)):
             if name not in there and name != MOTION:

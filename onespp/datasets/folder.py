@@ -6,10 +6,9 @@ Nothing here renders: data loaders read it (`onespp/clips/`).
 from __future__ import annotations
 
 import hashlib
-import time
 import traceback
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,7 +18,7 @@ from pydantic import Field
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import explain, read_bytes, write_bytes, write_text
 from onespp.render.files.json_file import JsonFile, format_json, read_json
-from onespp.render.files.lock import Busy, writing
+from onespp.render.files.lock import when_free, writing
 from onespp.render.files.manifest import Manifest
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.progress import Progress, silent
@@ -274,20 +273,10 @@ class DataSet:
     @contextmanager
     def _changing(self) -> Iterator[None]:
         """Holds the lock on dataset.json; waits for others who do."""
-        end = time.monotonic() + _SECONDS_FOR_OTHERS
-        while True:
-            lock = writing(self.folder, "dataset")
-            try:
-                lock.__enter__()
-                break
-            except Busy:
-                if time.monotonic() > end:
-                    raise
-                time.sleep(0.1)
-        try:
+        with ExitStack() as held:
+            when_free(lambda: held.enter_context(writing(self.folder, "dataset")),
+                      _SECONDS_FOR_OTHERS, 0.1)
             yield
-        finally:
-            lock.__exit__(None, None, None)
 
 
 def _part(path: Path) -> Part:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onespp.denoise.metrics.luminance import luminance
 from onespp.render.channels import asked_channels
 from onespp.render.errors import InputError
 from onespp.render.job import RenderJob
@@ -26,7 +27,6 @@ _FEWEST_THINGS = 0.02  # the share of pixels that show things
 _MARGIN = 0.15  # metres between the camera and what surrounds a thing
 _BLOCK = 8
 _SAMPLES = 4
-_LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
 
 
 @dataclass(frozen=True)
@@ -122,8 +122,8 @@ def unlike_a_picture(drawn: Drawn, frames: Iterable[Seen]) -> str | None:
 def displayed(color: np.ndarray) -> float:
     """Mean of the displayed values of noisy radiance, (h, w, 3), gamma 2.2, of 8x8 pixels each:
     of single ones it would be the lower, the noisier they are."""
-    luminance = color @ _LUMINANCE
-    side = min(_BLOCK, *luminance.shape)
-    h, w = (size // side for size in luminance.shape)
-    blocks = luminance[:h * side, :w * side].reshape(h, side, w, side).mean(axis=(1, 3))
+    shown = luminance(color.astype(np.float64))
+    side = min(_BLOCK, *shown.shape)
+    h, w = (size // side for size in shown.shape)
+    blocks = shown[:h * side, :w * side].reshape(h, side, w, side).mean(axis=(1, 3))
     return float(np.mean(np.clip(blocks, 0, 1) ** (1 / 2.2)))

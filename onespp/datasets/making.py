@@ -94,15 +94,21 @@ def make_all(data: DataSet, numbers: Iterable[int], progress: Progress = silent,
             except Exception as error:
                 if _is_of_the_disk(error):
                     raise
-                data.note_failure(number, error)
-                if last:
-                    outcome.failed[number] = in_a_line(error)
-                else:
-                    again.append(number)
-                    tell(f"sequence {number} failed and gets a second try: {in_a_line(error)}")
+                again += note_failure(data, outcome, number, error, last, tell)
             progress(len(outcome.made), len(numbers), what)
         waiting = again
     return outcome
+
+
+def note_failure(data: DataSet, outcome: Outcome, number: int, error: BaseException, last: bool,
+                 tell: Callable[[str], None]) -> list[int]:
+    """Log that a sequence failed; it again, for another try, unless this was the last one."""
+    data.note_failure(number, error)
+    if last:
+        outcome.failed[number] = in_a_line(error)
+        return []
+    tell(f"sequence {number} failed and gets a second try: {in_a_line(error)}")
+    return [number]
 
 
 def part_of(numbers: Iterable[int], part: str | None) -> list[int]:

@@ -19,12 +19,12 @@ from pathlib import Path
 from typing import Any
 
 from onespp.render.errors import InputError
-from onespp.render.files.lock import Busy
+from onespp.render.files.lock import when_free
 from onespp.render.host import backend
 from onespp.render.progress import Progress, silent
 
 from .folder import DataSet
-from .making import Outcome, in_a_line, make
+from .making import Outcome, in_a_line, make, note_failure
 
 LOCAL = "local"
 _SECONDS_TO_CONNECT = 15
@@ -68,12 +68,7 @@ def make_by_pool(data: DataSet, numbers: Iterable[int], address: str, workers: i
                     outcome.made.append(number)
                 else:
                     error = error or InputError(f"its task was {done.status}")
-                    data.note_failure(number, error)
-                    if last:
-                        outcome.failed[number] = in_a_line(error)
-                    else:
-                        waiting.append(number)
-                        tell(f"sequence {number} failed and gets a second try: {in_a_line(error)}")
+                    waiting += note_failure(data, outcome, number, error, last, tell)
             progress(len(outcome.made), len(numbers), what)
     return outcome
 
@@ -94,14 +89,8 @@ def task(folder: str, number: int, threads: int | None) -> tuple[str, str]:
     """Make a sequence in a worker; its folder, and the hash of its files."""
     _set_threads_once(threads)
     data = DataSet.open(Path(folder))
-    end = time.monotonic() + _SECONDS_FOR_ANOTHER
-    while True:
-        try:
-            return str(data.place(number)), make(data, number).digest
-        except Busy:
-            if time.monotonic() > end:
-                raise
-            time.sleep(0.5)
+    made = when_free(lambda: make(data, number), _SECONDS_FOR_ANOTHER, 0.5)
+    return str(data.place(number)), made.digest
 
 
 _threads: list[int | None] = []

@@ -24,12 +24,12 @@ def parse_size(text: str) -> tuple[int, int]:
     return height, width
 
 
-def parse_settings(texts: Iterable[str], option: str = "-D",
-                   last: bool = False) -> dict[str, str]:
+def parse_settings(texts: Iterable[str], option: str = "-D", last: bool = False,
+                   form: str = "NAME=VALUE") -> dict[str, str]:
     """Values by name, of texts NAME=VALUE.
 
     Args:
-        last: a name may hold "=", a value may not.
+        last: a name may hold "=", a value may not. form: how to write one, for the message.
 
     Raises:
         InputError: one has another form.
@@ -38,6 +38,6 @@ def parse_settings(texts: Iterable[str], option: str = "-D",
     for text in texts:
         name, equals, value = text.rpartition("=") if last else text.partition("=")
         if not (name and equals):
-            raise InputError(f"{option} {text} is not understood: use {option} NAME=VALUE")
+            raise InputError(f"{option} {text} is not understood: use {option} {form}")
         made[name] = value
     return made

@@ -7,8 +7,9 @@ from pathlib import Path
 import click
 
 from onespp.api.importing import import_frames
-from onespp.render.foreign.channel_maps import LAYOUTS, parse_channels
+from onespp.render.foreign.channel_maps import LAYOUTS
 
+from .arguments import parse_settings
 from .options import overwrite_option
 
 
@@ -48,6 +49,7 @@ def import_(folder: Path, out: Path | None, channels: tuple[str, ...], motion_y:
     Others: EXR files whose names end in the frame's number, one a frame or one a pass. What is
     known by its name is taken, and what is missing is told. See also `onespp check`.
     """
-    sequence = import_frames(folder, out, channels=parse_channels(channels),
+    sequence = import_frames(folder, out, channels=parse_settings(
+        channels, "--channel", form="NAME=SOURCE, as in normal=ViewLayer.Normal"),
                              motion_up=None if motion_y is None else motion_y == "up", **options)
     click.echo(f"imported {len(sequence.frames)} frames into {sequence.folder}")

@@ -33,6 +33,7 @@ from .exr_header import TYPES, Header, MalformedError, parse
 
 MOST_NAMED = 24  # channels in one sentence
 
+
 def write_exr(path: Path, channels: Mapping[str, np.ndarray],
               header: Mapping[str, str] | None = None, durable: bool = False) -> None:
     """Write an image: equal input gives equal bytes.

@@ -17,9 +17,11 @@ import datetime
 import errno
 import os
 import platform
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 from onespp.render.errors import InputError
 
@@ -32,15 +34,28 @@ try:
 except ImportError:
     fcntl = None
 
-class Busy(InputError):
-    """Another process writes it."""
-
-
+T = TypeVar("T")
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 _RESULTS = "denoise-"
 _PLACES = {"render": ("frames/*", "reference/*", "*.manifest.json"), "time": ("*.times.json",),
            "score": ("pictures/*", "*.scores.*"), "report": ("report/**/*",),
            "dataset": ("*.dataset.json", "*.README.md"), "sequence": ("*.sequence.json",)}
+
+
+class Busy(InputError):
+    """Another process writes it."""
+
+
+def when_free(call: Callable[[], T], seconds: float, pause: float) -> T:
+    """What a call gives that may be `Busy`: again after each pause, for so many seconds."""
+    end = time.monotonic() + seconds
+    while True:
+        try:
+            return call()
+        except Busy:
+            if time.monotonic() > end:
+                raise
+            time.sleep(pause)
 
 
 @contextmanager

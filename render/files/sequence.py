@@ -248,18 +248,18 @@ class FrameSequence:
 
     def read_reference(self, i: int) -> Reference:
         path = self._path("reference", i)
-        if self.has_parts(i):
+        there = read_header(path).channels
+        if _has_any(there, REFERENCE[1:]):
             return Reference._of_images(self._read(path, REFERENCE), self._spp(path))
-        known = set(CHANNELS["variance"].exr) <= set(read_header(path).channels)
-        images = self._read(path, ("color", "variance") if known else ("color",))
-        color = images["color"]  # of another program's, the variance is not known
-        return Reference(color, images.get("variance", np.full_like(color, np.nan)),
-                         self._spp(path))
+        if self.manifest.source == "render" or _has_any(there, ("variance",)):
+            images = self._read(path, ("color", "variance"))
+            return Reference(images["color"], images["variance"], self._spp(path))
+        color = self._read(path, ("color",))["color"]  # another program's
+        return Reference(color, np.full_like(color, np.nan), self._spp(path))
 
     def has_parts(self, i: int) -> bool:
         """Whether a frame's reference has independent parts, so is of no older version."""
-        names = read_header(self._path("reference", i)).channels
-        return any(c in names for name in REFERENCE[1:] for c in CHANNELS[name].exr)
+        return _has_any(read_header(self._path("reference", i)).channels, REFERENCE[1:])
 
     def write_reference(self, i: int, reference: Reference,
                         provenance: Mapping[str, str] | None = None) -> None:
@@ -375,6 +375,11 @@ class FrameSequence:
             raise InputError(f"{path} does not say its samples a pixel ('spp' in its header): "
                              "render the reference again")
         return int(text)
+
+
+def _has_any(there: Iterable[str], names: Iterable[str]) -> bool:
+    """Whether a file's channels hold a part of any of these of ours."""
+    return not {*there}.isdisjoint(c for name in names for c in CHANNELS[name].exr)
 
 
 def _half(image: np.ndarray) -> np.ndarray:

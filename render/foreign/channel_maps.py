@@ -79,18 +79,6 @@ def channel_map(images: Mapping[str, np.ndarray], layout: str,
     return ChannelMap(found, up=blender)
 
 
-def parse_channels(texts: Iterable[str]) -> dict[str, str]:
-    """Name -> source of texts such as normal=ViewLayer.Normal; InputError where one is not."""
-    given = {}
-    for text in texts:
-        name, equals, source = text.partition("=")
-        if not equals:
-            raise InputError(f"--channel {text[:60]} is not understood: use NAME=SOURCE, as in "
-                             "normal=ViewLayer.Normal")
-        given[name.strip()] = source.strip()
-    return given
-
-
 def stacked(images: Mapping[str, np.ndarray], channels: tuple[str, ...]) -> np.ndarray:
     """(h, w) or (h, w, c) float32."""
     planes = [images[name].astype(np.float32) for name in channels]

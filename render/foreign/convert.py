@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -116,33 +116,27 @@ class _Reader:
         self.files, self.conventions = files, conventions
         number = next(iter(files.frames))
         images = files.read(number)
-        try:
-            self.map = channel_map(images, conventions.layout, conventions.channels)
-        except InputError as error:
-            raise _about(files, number, error) from None
         self.size = next(iter(images.values())).shape
-        self.solved = "position" in self.map.channels
-        if "distance" in self.map.channels and not self.solved and conventions.fov is None:
-            raise _about(files, number, InputError(
-                "has distances along the rays and no positions: say how wide the camera sees, as "
-                "--fov 39.6 (degrees across the image's width), or write depth or positions"))
+        with _naming(files, number):
+            self.map = channel_map(images, conventions.layout, conventions.channels)
+            self.solved = "position" in self.map.channels
+            if "distance" in self.map.channels and not self.solved and conventions.fov is None:
+                raise InputError(
+                    "has distances along the rays and no positions: say how wide the camera sees, "
+                    "as --fov 39.6 (degrees across the image's width), or write depth or positions")
 
     def read(self, i: int, objects: Mapping[int, int]) -> Frame:
         """A frame; objects: number in the files -> ID, empty while they are counted."""
         images = self.files.read(i)
-        try:
+        with _naming(self.files, i):
             return self._frame(i, self._stacks(images), objects)
-        except InputError as error:
-            raise _about(self.files, i, error) from None
 
     def numbers(self, i: int) -> np.ndarray:
         """The numbers of objects that a frame shows."""
         images = self.files.read(i)
-        try:
+        with _naming(self.files, i):
             stacks = self._stacks(images)
-        except InputError as error:
-            raise _about(self.files, i, error) from None
-        return np.unique(stacks["id"][_shown(stacks, self.size)])
+            return np.unique(stacks["id"][_shown(stacks, self.size)])
 
     def notes(self) -> list[str]:
         channels = self.map.channels
@@ -214,9 +208,13 @@ class _Reader:
         return np.where(np.isfinite(motion), motion, 0) * signs
 
 
-def _about(files: NumberedFiles, i: int, error: InputError) -> InputError:
-    """A sentence on the file of a frame, of one that begins with what is wrong."""
-    return InputError(f"{files.paths(i)[0]} {error}")
+@contextmanager
+def _naming(files: NumberedFiles, i: int) -> Iterator[None]:
+    """Errors inside begin with what is wrong; whoever sees them is told the file of the frame."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{files.paths(i)[0]} {error}") from None
 
 
 def _objects(reader: _Reader) -> dict[int, int]:
@@ -271,13 +269,11 @@ def _take_references(truth: NumberedFiles, sequence: FrameSequence, conventions:
         raise InputError(f"{truth.folder} has no file for any of the frames: number them alike")
     for i in taken:
         images = truth.read(i)
-        try:
+        with _naming(truth, i):
             color = stacked(images, _radiance(images, conventions))
             if color.shape[:2] != sequence.size:
                 raise InputError(f"is {color.shape[1]}x{color.shape[0]} pixels, the frames are "
                                  f"{sequence.size[1]}x{sequence.size[0]}")
-        except InputError as error:
-            raise _about(truth, i, error) from None
         sequence.write_reference(i, Reference(color, np.full_like(color, np.nan), None))
     tell(f"took {len(taken)} references from {truth.folder}; how many samples they have, and how "
          "noisy they are, is not known")

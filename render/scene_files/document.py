@@ -75,6 +75,14 @@ class Node:
                              "transform")
         return value
 
+    def triple(self, name: str, kind: str = "vector",
+               default: tuple[float, float, float] | None = None) -> np.ndarray:
+        """A point or another vector of the file's, (3,) float64."""
+        value = np.asarray(self.values.get(name, default), float)
+        if value.shape != (3,) or not np.isfinite(value).all():
+            raise self.error(f"'{name}' of this {self.plugin} is no {kind}: use x, y and z")
+        return value
+
     def check_names(self, *names: str) -> None:
         """SceneError if it has another property, as by a slip of the pen."""
         for name, value in self.values.items():

@@ -155,18 +155,18 @@ def _analytic(node: Node, world: np.ndarray) -> tuple[Geometry, np.ndarray]:
     if not radius > 0:
         raise node.error(f"the radius of this {node.plugin} is {radius:g}: use more than 0")
     if node.plugin == "sphere":
-        world = world @ translate(_point(node, "center", (0, 0, 0))) @ scale(radius)
+        world = world @ translate(node.triple("center", "point", (0, 0, 0))) @ scale(radius)
         if _is_round(world[:3, :3]):
             mirrored = np.linalg.det(world[:3, :3]) < 0
             return Sphere(flipped ^ bool(mirrored)), world @ scale((-1 if mirrored else 1, 1, 1))
         ball = meshes.ellipsoid((1, 1, 1), 96)
         return _turned(meshes.place(ball, _Z_UP), flipped), world
-    start, end = _point(node, "p0", (0, 0, 0)), _point(node, "p1", (0, 0, 1))
+    start, end = node.triple("p0", "point", (0, 0, 0)), node.triple("p1", "point", (0, 0, 1))
     axis = end - start
     length = float(np.linalg.norm(axis))
     if not length > 0:
         raise node.error("the two ends of this cylinder are one point: move p0 or p1")
-    world = world @ translate(start) @ _frame(axis / length) @ scale((radius, radius, length))
+    world = world @ translate(start) @ turned_to(axis / length) @ scale((radius, radius, length))
     if not _is_round(world[:3, :2]) or abs(world[:3, :2].T @ world[:3, 2]).max() > (
             _UNROUND * np.linalg.norm(world[:3, 0]) * np.linalg.norm(world[:3, 2])):
         raise node.error("this cylinder is stretched or sheared by its transform: use a mesh")
@@ -182,15 +182,8 @@ def _turned(mesh: Mesh, flipped: bool) -> Mesh:
     return Mesh(mesh.vertices, mesh.faces[:, ::-1], -mesh.normals, mesh.uv)
 
 
-def _point(node: Node, name: str, default: tuple[float, float, float]) -> np.ndarray:
-    value = np.asarray(node.values.get(name, default), float)
-    if value.shape != (3,) or not np.isfinite(value).all():
-        raise node.error(f"'{name}' of this {node.plugin} is no point: use x, y and z")
-    return value
-
-
-def _frame(z: np.ndarray) -> np.ndarray:
-    """A rotation whose third column is `z`, as Mitsuba's `coordinate_system` has it."""
+def turned_to(z: np.ndarray) -> np.ndarray:
+    """A rotation, (4, 4), whose third column is `z`, as Mitsuba's `coordinate_system` has it."""
     s, t = (np.array(v).ravel() for v in mi.coordinate_system(mi.ScalarVector3f(z.tolist())))
     matrix = np.eye(4)
     matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = s, t, z

@@ -12,6 +12,7 @@ from onespp.scenes.transforms import translate
 from onespp.scenes.validity import ENVIRONMENTS, LIGHTS
 
 from .document import Node
+from .geometry import turned_to
 from .surfaces import Surfaces, emitted
 
 _IGNORED = "sampling_weight"  # each emitter is sampled as the others are
@@ -82,30 +83,14 @@ def _point(node: Node, surfaces: Surfaces) -> Light:
             made[key] = value
     place = node.matrix()
     if "position" in node.values:
-        place = translate(_vector(node, "position"))
+        place = translate(node.triple("position"))
     if "direction" in node.values:
-        place = _along(_vector(node, "direction"), node)
+        direction = node.triple("direction")
+        length = np.linalg.norm(direction)
+        if not length > 0:
+            raise node.error("its direction has no length: use x, y and z that are not all 0")
+        place = turned_to(direction / length)
     try:
         return Light(made, place)
     except SceneError as error:
         raise node.error(str(error)) from None
-
-
-def _vector(node: Node, name: str) -> np.ndarray:
-    value = np.asarray(node.values[name], float)
-    if value.shape != (3,) or not np.isfinite(value).all():
-        raise node.error(f"'{name}' of this {node.plugin} is no vector: use x, y and z")
-    return value
-
-
-def _along(direction: np.ndarray, node: Node) -> np.ndarray:
-    """A rotation that takes +z to a direction."""
-    length = np.linalg.norm(direction)
-    if not length > 0:
-        raise node.error("its direction has no length: use x, y and z that are not all 0")
-    z = direction / length
-    x = np.cross(np.eye(3)[np.argmin(abs(z))], z)
-    x /= np.linalg.norm(x)
-    matrix = np.eye(4)
-    matrix[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
-    return matrix

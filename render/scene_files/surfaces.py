@@ -105,11 +105,11 @@ def emitted(value: Any, surfaces: Surfaces, node: Node) -> Any:
         value = {"type": "spectrum", "value": float(value)}
     if isinstance(value, Node):
         value = surfaces.texture(value)
-    light = {"type": "area"} if value is None else {"type": "area", "radiance": value}
     if value is not None and value["type"] == "bitmap":
         return value
     try:
-        loaded = plugins.area_light(value, "its radiance") if value else mi.load_dict(light)
+        loaded = plugins.area_light(value, "its radiance") if value else mi.load_dict(
+            {"type": "area"})
     except SceneError as error:
         raise node.error(str(error)) from None
     if mi.has_flag(loaded.flags(), mi.EmitterFlags.SpatiallyVarying):

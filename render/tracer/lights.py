@@ -53,14 +53,13 @@ _DIMMEST = 1e-6  # share of l(U): a group that gives less has no visibility
 class Lights:
     """All strata of a scene's lights, in the order of `scene.emitters()`.
 
-    stratum: emitter, cells a side and cell of each (`stratum_word`). group: that it is in.
-    sizes: strata in each group, none where all lights are one. emitters: how many there are.
+    stratum: which part of which emitter it is (`stratum_word`). group: that it is in. sizes: strata
+    in each group, none where all lights are one.
     """
 
     stratum: mi.UInt32
     group: mi.UInt32
     sizes: tuple[int, ...]
-    emitters: int
 
 
 @dataclass
@@ -106,7 +105,7 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     Args:
         lights: `Lights`, of the scene.
     """
-    emitters, strata = lights.emitters, dr.width(lights.stratum)
+    emitters, strata = len(scene.emitters()), dr.width(lights.stratum)
     choice, jitter = sampler.next_1d(), sampler.next_2d()
 
     # One pass: the sum, and a pick in proportion to luminance (a reservoir of one).

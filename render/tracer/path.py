@@ -25,10 +25,9 @@ from .candidates import sought_light
 from .lights import DirectLight, Lights, power_heuristic, resample_lights, shape_index
 from .sampler import Sampler, Sobol
 
-SHORT = 8      # segments, up to which paths end by themselves
-FIRST = 5     # segments after which roulette begins, as in Mitsuba
+SHORT = 8  # segments, up to which paths end by themselves
+FIRST = 5  # segments after which roulette begins, as in Mitsuba
 _LIKELY = 0.95  # the largest probability to go on
-
 LARGEST_VISIBILITY = 1e4  # picks of 16 lights give up to 2560, by what lights.py lets a pick weigh
 
 
@@ -131,8 +130,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         hit_shape = dr.select(met, shape_index(pi.shape, met), hit_shape)
         hit_face = dr.select(met, pi.prim_index, hit_face)
 
-    radiance = Radiance(emission, direct, indirect, specular, hit_distance, hit_shape,
-                        hit_face)
+    radiance = Radiance(emission, direct, indirect, specular, hit_distance, hit_shape, hit_face)
     return _with_split(radiance, arrived, split)
 
 

@@ -58,7 +58,7 @@ def find_lights(stage: MitsubaScene) -> Lights:
     group = np.repeat(groups, 4**halvings)
     sizes = np.bincount(group) if count > 1 else ()
     return Lights(aligned(mi.UInt32, np.array(words, np.uint32)),
-                  aligned(mi.UInt32, group.astype(np.uint32)), tuple(map(int, sizes)), count)
+                  aligned(mi.UInt32, group.astype(np.uint32)), tuple(map(int, sizes)))
 
 
 def cut(luminances: np.ndarray, delta: np.ndarray) -> np.ndarray:

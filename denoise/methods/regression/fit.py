@@ -30,7 +30,7 @@ from typing import NamedTuple
 import drjit as dr
 
 from onespp.denoise.jit.arrays import Bool, Color, Float, Vector3
-from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.masked import tabulate
 from onespp.denoise.jit.structure import arrays_of
 
 from .blocks import Blocks, Shift
@@ -96,7 +96,7 @@ def _fit(blocks: Blocks, shift: Shift, sample: Sample, is_fitted: Bool, sigma2: 
     """Records of `_Fit`, one a block. Evaluates."""
     stencil = blocks.stencil
     words = [dr.select(is_fitted, stencil.Float(1), 0), *arrays_of(sample)]
-    records = stencil.pack([*words, *[stencil.Float(0)] * (_RECORD - _USED)])
+    records = tabulate(stencil, words)
     extremes = blocks.reduce(records, _RECORD, _USED, shift, [_FAR] * 9 + [-_FAR] * 9,
                              _widened, _joined)
     frame = _frame_of(extremes)
@@ -115,7 +115,7 @@ def _fit(blocks: Blocks, shift: Shift, sample: Sample, is_fitted: Bool, sigma2: 
     count = 1 + FEATURES + 3 + len(_PAIRS) + 3 * FEATURES
     sums = blocks.reduce(records, _RECORD, _USED, shift, [0.0] * count, visit,
                          lambda a, b: [x + y for x, y in zip(a, b)])
-    return _packed(stencil, _solved(frame, sums, sigma2), blocks.count)
+    return tabulate(stencil, arrays_of(_solved(frame, sums, sigma2)), blocks.count)
 
 
 def _sample(words: Sequence[Float]) -> Sample:
@@ -209,8 +209,3 @@ def _solve(matrix: dict[tuple[int, int], Float], sides: list[list[Float]],
                 x[i] = dr.fma(-low[j, i], x[j], x[i])
         solutions.append(x)
     return solutions
-
-
-def _packed(stencil: Stencil, fit: _Fit, lanes: int) -> Float:
-    words = arrays_of(fit)
-    return stencil.pack([*words, *[stencil.Float(0)] * (_FIT - len(words))], lanes)

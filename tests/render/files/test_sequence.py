@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 
 from onespp.render.channels import CHANNELS, HALF
 from onespp.render.errors import InputError
-from onespp.render.files.exr import read_exr, read_header
+from onespp.render.files.exr import read_exr, read_header, write_exr
 from onespp.render.files.frame_ranges import format_frames, parse_frames
 from onespp.render.files.manifest import Manifest, Run
 from onespp.render.files.matrices import format_matrices, read_matrices
@@ -43,6 +43,22 @@ def test_a_frame_comes_back_exactly_and_what_is_stored_as_half_to_half(tmp_path)
     np.testing.assert_array_equal(back.world_from_object, frame.world_from_object)
     assert back.index == 1
     assert read_header(sequence.folder / "frames/0001.exr").attributes["scene"] == "small"
+
+
+def test_references_of_radiance_alone_are_taken_of_other_programs_only(tmp_path):
+    white = np.ones((HEIGHT, WIDTH), np.float32)
+    for source in ("foreign", "render"):
+        sequence = FrameSequence.create(tmp_path / source, small_manifest().model_copy(
+            update={"source": source}))
+        write_exr(sequence.folder / "reference/0000.exr", dict.fromkeys("RGB", white),
+                  {"spp": "64"})
+        if source == "render":
+            with pytest.raises(InputError, match=r"lacks the channel variance\.R"):
+                sequence.read_reference(0)
+            continue
+        reference = sequence.read_reference(0)
+        assert np.isnan(reference.variance).all()
+        assert (reference.color == 1).all()
 
 
 def test_channel_names_are_the_ones_other_programs_know(tmp_path):

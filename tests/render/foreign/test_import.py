@@ -13,10 +13,11 @@ import pytest
 from onespp.api.importing import import_frames, unfit_methods
 from onespp.denoise.geometry.correspondence import NOWHERE, previous_pixel
 from onespp.denoise.studies.agreement import AS_IT_IS, agreement
+from onespp.render.cli.arguments import parse_settings
 from onespp.render.errors import InputError
 from onespp.render.files.exr import read_any_exr
 from onespp.render.foreign.camera_of_positions import camera_of_positions
-from onespp.render.foreign.channel_maps import channel_map, parse_channels
+from onespp.render.foreign.channel_maps import channel_map
 from onespp.render.frame import Frame
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
@@ -179,6 +180,13 @@ def test_motion_read_the_wrong_way_is_named(frames, tmp_path, options, words, ca
         assert words in out
 
 
+def test_what_the_assignments_layout_would_ignore_is_refused(tmp_path):
+    (tmp_path / "matrix_0.mat").write_bytes(b"")
+    for options in ({"fov": 40.0}, {"reference": tmp_path}, {"motion_up": True}):
+        with pytest.raises(InputError, match="in the assignment's layout"):
+            import_frames(tmp_path, tmp_path / "out", **options)
+
+
 def test_a_camera_is_not_made_up():
     y, x = np.indices(SIZE) + 0.5
     plane = np.stack([x, y, 0 * x], -1)  # fits more cameras than one
@@ -198,7 +206,7 @@ def test_what_cannot_be_told_is_asked(images, given, words):
     with pytest.raises(InputError, match=words):
         channel_map(images, "auto", given)
     with pytest.raises(InputError, match="NAME=SOURCE"):
-        parse_channels(["normal"])
+        parse_settings(["normal"], "--channel", form="NAME=SOURCE")
 
 
 def test_files_of_other_programs_that_are_cut_or_damaged_are_one_sentence(frames, tmp_path):
