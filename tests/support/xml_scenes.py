@@ -65,7 +65,8 @@ def indoor(folder: Path) -> Path:
   <shape type="rectangle" id="lamp">
     <transform name="to_world"><scale x="0.5" y="0.3"/><rotate x="1" angle="90"/>
       <translate y="2.38"/></transform>
-    <emitter type="area"><rgb name="radiance" value="18, 16, 12"/></emitter></shape>
+    <emitter type="area"><rgb name="radiance" value="18, 16, 12"/>
+      <float name="sampling_weight" value="2"/></emitter></shape>
   <shape type="sphere"><point name="center" x="-1.2" y="1.6" z="0.3"/>
     <float name="radius" value="0.15"/>
     <emitter type="area"><spectrum name="radiance" value="14"/></emitter></shape>

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -16,6 +17,7 @@ from onespp.denoise.studies.agreement import AS_IT_IS, agreement
 from onespp.render.cli.arguments import parse_settings
 from onespp.render.errors import InputError
 from onespp.render.files.exr import read_any_exr
+from onespp.render.files.exr_header import _attributes
 from onespp.render.foreign.camera_of_positions import camera_of_positions
 from onespp.render.foreign.channel_maps import channel_map
 from onespp.render.frame import Frame
@@ -111,8 +113,8 @@ def test_what_blender_writes(frames, tmp_path):
         np.testing.assert_allclose(got["color"], frame["color"], rtol=1e-3, atol=1e-6)
         np.testing.assert_allclose(got["depth"], frame["depth"], rtol=1e-6)
         np.testing.assert_allclose(got["normal"], frame["normal"], atol=1e-6)
-        assert len(np.unique(np.stack([got["id"], frame["id"]]).reshape(2, -1), axis=1).T) == len(
-            np.unique(frame["id"]))  # the same objects, in other numbers
+        pairs = np.unique(np.stack([got["id"], frame["id"]]).reshape(2, -1), axis=1)
+        assert pairs.shape[1] == len({*pairs[0]}) == len({*pairs[1]})  # objects, in other numbers
     moved = sequence.read_frame(2, ["motion"])["motion"]
     np.testing.assert_allclose(moved, motion(frames[0], frames[1]), atol=1e-3)
     assert np.abs(moved).max() > 2
@@ -159,7 +161,21 @@ def test_a_file_for_each_pass_and_names_of_ones_own(frames, tmp_path):
     assert sequence.has_reference(1)
     assert not sequence.has_reference(0)
     with pytest.raises(InputError, match="another content"):  # read otherwise, other frames
-        import_frames(folder, tmp_path / "out", channels={**channels, "normal": "none"})
+        import_frames(folder, tmp_path / "out", channels={**channels, "normal": "none"},
+                      reference=truth)
+
+
+def test_what_is_as_far_as_blender_says_nothing_is_shows_nothing(tmp_path):
+    folder = tmp_path / "b"
+    folder.mkdir()
+    depth = np.full((*SIZE, 1), 5.0)
+    depth[:10] = 1e10
+    write(folder / "1.exr", named("L.Combined", np.ones((*SIZE, 3)), "RGB")
+          | named("L.Depth", depth, "Z"))
+    frame = import_frames(folder, tmp_path / "out").read_frame(1, ["id", "depth"])
+    assert (frame["id"][:10] == -1).all()
+    assert (frame["id"][10:] == 0).all()
+    assert not frame["depth"][:10].any()
 
 
 @pytest.mark.parametrize(("options", "words"), [
@@ -207,6 +223,22 @@ def test_what_cannot_be_told_is_asked(images, given, words):
         channel_map(images, "auto", given)
     with pytest.raises(InputError, match="NAME=SOURCE"):
         parse_settings(["normal"], "--channel", form="NAME=SOURCE")
+
+
+@pytest.mark.parametrize("kind", [blender, mitsuba])
+def test_a_chunk_that_says_it_is_another_is_noticed_before_it_is_decoded(frames, tmp_path, kind):
+    path = next(kind(tmp_path / "x", frames[:1]).iterdir())
+    data = bytearray(path.read_bytes())
+    _, table = _attributes(bytes(data), 8)
+    if kind is blender:  # several headers, and an empty one
+        while data[table] != 0:
+            _, table = _attributes(bytes(data), table)
+        table += 1
+    first, = struct.unpack_from("<Q", data, table)
+    data[first] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="is truncated or damaged"):
+        read_any_exr(path)
 
 
 def test_files_of_other_programs_that_are_cut_or_damaged_are_one_sentence(frames, tmp_path):
