@@ -25,13 +25,17 @@ def folder(tmp_path_factory):
 
 
 SCORE, COMPARE = "score {} --no-pictures", "compare {0}/{1} {0}/{1}"
+FULL = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
+SLOW = pytest.mark.slow
 
 
 @pytest.mark.parametrize(("words", "redirection"), [
     (SCORE, ">&-"), (SCORE, "2>&-"), (SCORE, "<&- >&- 2>&-"), (SCORE, "2>&1 | true"),
-    (COMPARE, "2>&1 | true"),
-    pytest.param(SCORE, "2>/dev/full", marks=pytest.mark.skipif(
-        not os.path.exists("/dev/full"), reason="no device that is always full"))])
+    (COMPARE, "2>&1 | true"), pytest.param(SCORE, "2>/dev/full", marks=FULL),
+    *(pytest.param(SCORE, where, marks=SLOW) for where in (">&- 2>&-", "| true")),
+    *(pytest.param(COMPARE, where, marks=SLOW) for where in (
+        ">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-", "| true")),
+    pytest.param(COMPARE, "2>/dev/full", marks=[FULL, SLOW])])
 def test_a_closed_stream_ends_no_job(folder, words, redirection):
     scores = folder / "scores.json"
     scores.unlink(missing_ok=True)
@@ -50,7 +54,8 @@ def test_a_closed_stream_does_not_end_a_job_halfway(tmp_path):
     assert (tmp_path / "a/scores.json").exists()
 
 
-@pytest.mark.parametrize("redirection", ["2>&-", "2>&1 | true"])
+@pytest.mark.parametrize("redirection", [
+    "2>&-", "2>&1 | true", *(pytest.param(where, marks=SLOW) for where in (">&-", "| true"))])
 def test_bad_input_still_says_so_by_its_exit_code(redirection, tmp_path):
     done = shell(f"score {tmp_path / 'none'}", redirection)
     assert done.returncode == 2

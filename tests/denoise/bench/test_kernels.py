@@ -45,8 +45,9 @@ def clock(monkeypatch):
     monkeypatch.setattr(machine_limits, "timed", timed)
 
 
-def test_the_command_prints_the_figures_of_every_kernel_as_json(clock, monkeypatch):
-    some = ("temporal", "svgf", "onespp")  # (all are compared with their formulas below)
+@pytest.mark.parametrize("some", [
+    ("temporal", "svgf", "onespp"), pytest.param(tuple(METHODS), marks=pytest.mark.slow)])
+def test_the_command_prints_the_figures_of_every_kernel_as_json(clock, monkeypatch, some):
     monkeypatch.setattr(kernels, "KERNELS", {name: KERNELS[name] for name in some})
     result = CliRunner().invoke(onespp.cli.app, ["bench", "--size", "20x12", "--repeats", "2",
                                              "--json", "-"])
@@ -107,13 +108,14 @@ def test_the_calls_of_a_method_of_ones_own_stand_beside_the_kernels(clock, monke
     assert "--scaling takes no --method" in str(result.exception)
 
 
-def test_scaling_has_every_kernel_at_every_size(clock, monkeypatch):
-    two = ("temporal", "atrous")
-    monkeypatch.setattr(kernels, "KERNELS", {name: KERNELS[name] for name in two})
+@pytest.mark.parametrize("some", [
+    ("temporal", "atrous"), pytest.param(tuple(METHODS), marks=pytest.mark.slow)])
+def test_scaling_has_every_kernel_at_every_size(clock, monkeypatch, some):
+    monkeypatch.setattr(kernels, "KERNELS", {name: KERNELS[name] for name in some})
     result = scaling(1, sizes=[(6, 9), (12, 5)])
     assert result.sizes == ["9x6", "5x12"]
     network = {"OIDN fast": [CALL_MS] * 2} if AVAILABLE else {}
-    assert result.ms == {name: [KERNEL_MS] * 2 for name in two} | network
+    assert result.ms == {name: [KERNEL_MS] * 2 for name in some} | network
     out = io.StringIO()
     print_scaling(Scaling(["10x10", "20x10"], 1, {"atrous": [0.5, 1.25]}),
                   Console(file=out, width=80))
