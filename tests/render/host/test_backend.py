@@ -84,8 +84,8 @@ def spoiled(tmp_path, module: str, code: str) -> str:
 @pytest.mark.parametrize(("module", "code", "words"), [
     ("OpenEXR", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)",
      "BAD   OpenEXR: crashed (SIGSEGV) where it was tried: run `"),
-    pytest.param("OpenEXR", "import ctypes; ctypes.string_at(8)", "BAD   OpenEXR: crashed (SIGSEGV)",
-                 marks=pytest.mark.slow),
+    pytest.param("OpenEXR", "import ctypes; ctypes.string_at(8)",
+                 "BAD   OpenEXR: crashed (SIGSEGV)", marks=pytest.mark.slow),
     pytest.param("matplotlib", "raise ImportError('no such symbol')",
                  "BAD   Matplotlib: ImportError: no such symbol", marks=pytest.mark.slow),
     ("av", "def open(*_, **__): raise RuntimeError('none for this platform')",
