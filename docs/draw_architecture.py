@@ -28,6 +28,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("scenes", "render", "denoise")
 NAME = "onespp"
 
+LONGEST_TITLE = 21  # letters
 ROOM_WIDTH, LINE, MARGIN, GAP, LAYER_GAP, DUMMY = 158, 13, 8, 16, 44, 6
 LETTERS = 27     # of file names in a line of a room
 SWEEPS = 24
@@ -231,6 +232,12 @@ def _offsets(points: list[Point]) -> list[float]:
     return offsets
 
 
+def _short(title: str) -> str:
+    """A path that fits into a room's width; of a long one its last part, with its folder's colour
+    and place to tell the rest."""
+    return title if len(title) <= LONGEST_TITLE else f"…/{title.rpartition('/')[2]}"
+
+
 def text_of(room: Room) -> list[str]:
     """A room's lines of file names."""
     found, line = [], ""
@@ -288,7 +295,7 @@ def _kind(rooms: Mapping[str, Room], key: Point) -> str:
 def _drawn(room: Room, x: float, y: float, height: float) -> list[str]:
     package = room.title.split("/")[0]
     count = f"{len(room.files)} file{'s' * (len(room.files) > 1)}, {room.lines} lines"
-    texts = [("title", room.title), ("count", count), *(("file", t) for t in text_of(room))]
+    texts = [("title", _short(room.title)), ("count", count), *(("file", t) for t in text_of(room))]
     return [f'<g class="room {package if package in PACKAGES else "top"}">',
             f'<rect x="{x:.0f}" y="{y:.0f}" width="{ROOM_WIDTH}" height="{height}" rx="5"/>',
             *(f'<text class="{kind}" x="{x + MARGIN:.0f}" '

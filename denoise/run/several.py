@@ -66,7 +66,7 @@ def what_to_know(sequence: FrameSequence, default: bool) -> Iterator[str]:
         install = "" if all(PEERS[name].available() for name in BETTER_ON_PLAIN) else (
             ", with Open Image Denoise installed (pip install 'onespp[oidn]')")
         yield (f"these frames lack {' and '.join(SPLIT)}, on which the default method builds: "
-               f"without them --method {' or '.join(BETTER_ON_PLAIN)} is often better{install}")
+               f"without them --method {' or '.join(BETTER_ON_PLAIN)} is sometimes better{install}")
     for a, b in _gaps(sequence):
         yield (f"there is no frame between {a} and {b}: methods with a history took {b} for the "
                f"frame after {a}")
