@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -153,6 +154,19 @@ def test_the_peak_counts_only_work_between_the_marks():
     np.ones(256 << 17)
     peak.end()
     assert 200 < peak.megabytes < 330
+
+
+@pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="not glibc")
+@needs_marks
+def test_memory_that_the_allocator_had_kept_counts_when_it_is_used_again():
+    np.ones(30 << 17)  # blocks of up to 30 MiB come from the heap from now on
+    kept = [np.ones(1 << 17) for _ in range(128)]  # of 1 MiB
+    del kept
+    peak = PeakMemory()
+    peak.begin()
+    again = [np.ones(1 << 17) for _ in range(96)]
+    peak.end()
+    assert len(again) < peak.megabytes + 8 < 120
 
 
 @needs_marks
