@@ -19,10 +19,10 @@ from onespp.render.reference_error import (
     FEWEST_SPP,
     MOST_SPP,
     FrameNoise,
+    expected_error,
     expected_spp,
     frame_noise,
     next_to_grow,
-    standard_error,
 )
 from onespp.render.tracer.reference import (
     MOST_SAMPLES,
@@ -35,7 +35,7 @@ from onespp.render.tracer.renderer import Renderer
 
 SECONDS_BETWEEN_SAVES = 10.0
 
-_PILOT_SPP = 16  # of one frame, by which the others are judged beforehand
+_OF_OLD = 64  # samples: an older version's reference is kept from here on, and else made anew
 _TIMED_PATHS = 1 << 20  # or 64 samples
 
 _TOTALS = tuple(f"total{part}" for part in range(PARTS))
@@ -96,20 +96,21 @@ class References:
                       tell: Callable[[str], None] = lambda sentence: None) -> None:
         """Render and double references until the headline is known to `decibels`.
 
-        The headline is the mean over frames of the PSNR of a method of 40 dB, and its error the
-        standard error of `reference_error.py`. References of an older version have no halves that
-        could tell; those of FEWEST_SPP or more are kept and left out.
+        The headline is the mean over frames of the PSNR of a method of 40 dB, and its error that
+        of `reference_error.py`. References of an older version have no halves that could tell;
+        those of 64 samples or more are kept and left out.
 
         Args:
             progress: told of the frames that are done, as far as can be foreseen.
             tell: told what it is expected to cost, and that not more can be had.
         """
         what, count = f"reference, to {decibels:g} dB", len(frames)
-        growing = [i for i in frames if self._samples(i) < FEWEST_SPP or self.sequence.has_parts(i)]
+        growing = [i for i in frames
+                   if self._samples(i) < _OF_OLD or self.sequence.has_parts(i)]
         noises: dict[int, FrameNoise] = {}
         there = [i for i in growing if self._samples(i)] or growing[:1]
         for index in there:
-            self.grow(index, _PILOT_SPP, lambda done, total, *_: progress(0, count, what))
+            self.grow(index, self._fewest(index), lambda done, total, *_: progress(0, count, what))
             self._measure(index, noises)
         self._tell_cost(growing, noises, decibels, tell)
 
@@ -121,15 +122,20 @@ class References:
 
         target = _total(growing, noises, decibels)
         for index in growing:
-            if self._samples(index) < FEWEST_SPP:
+            if index not in noises:
                 grow(index, FEWEST_SPP, target)
         target = _total(growing, noises, decibels)
         while (step := next_to_grow(noises, decibels)) is not None:
             grow(*step, target)
-        if (reached := standard_error(noises.values())) > decibels:
+        if (reached := expected_error(noises.values())) > decibels:
             tell(f"references end at {MOST_SPP} samples a pixel: the PSNR of a method of 40 dB is "
                  f"known to {reached:.2g} dB, not {decibels:g}")
         progress(count, count, what)
+
+    def _fewest(self, index: int) -> int:
+        """Samples a pixel that tell how many it takes."""
+        old = self._samples(index) and not self.sequence.has_parts(index)
+        return _OF_OLD if old else FEWEST_SPP
 
     def _measure(self, index: int, noises: dict[int, FrameNoise]) -> None:
         reference = self.sequence.read_reference(index)
@@ -225,8 +231,8 @@ def _foreseen(frames: Sequence[int], noises: Mapping[int, FrameNoise]) -> dict[i
     if not known:
         return {}
     like = [noise.at(FEWEST_SPP) for noise in known]
-    usual = FrameNoise(FEWEST_SPP, float(np.mean([noise.crossed for noise in like])),
-                       float(np.mean([noise.squared for noise in like])))
+    usual = FrameNoise(FEWEST_SPP, *(float(np.mean([getattr(noise, part) for noise in like]))
+                                     for part in ("crossed", "squared", "bent")))
     return {i: max(noises[i], noises[i].at(FEWEST_SPP), key=lambda noise: noise.spp)
             if i in noises else usual for i in frames}
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from onespp.render.reference_error import (
-    FEWEST_SPP,
+    LEFT,
     MOST_SPP,
     FrameNoise,
+    expected_error,
     expected_spp,
     frame_noise,
     next_to_grow,
-    standard_error,
 )
 from onespp.show.srgb import srgb_from_linear
 
@@ -78,10 +78,27 @@ def test_clipped_black_and_broken_pixels_add_nothing():
     assert 0 < frame_noise(broken, 64).variance < frame_noise(good, 64).variance
 
 
+def test_what_the_curve_leaves_is_a_share_of_what_the_jackknife_takes_off():
+    rng = np.random.default_rng(5)
+    parts = 0.2 + 0.03 * rng.standard_normal((4, 200, 200, 3))
+    second = 1.055 / 2.4 * (1 / 2.4 - 1) * 0.2 ** (1 / 2.4 - 2)
+    taken_off = 10 / math.log(10) / 1e-4 * (second * 0.03**2 / 4) ** 2
+    assert frame_noise(parts, 16).bent == pytest.approx(LEFT * taken_off, rel=0.1)
+    assert frame_noise(parts, 16).at(64).bent == pytest.approx(LEFT * taken_off / 16, rel=0.1)
+
+
+def test_a_bias_that_all_frames_share_does_not_average_away():
+    assert expected_error([FrameNoise(64, 0.09, 0, 0.4)] * 9) == pytest.approx(math.hypot(0.1, 0.4))
+    bent = {0: FrameNoise(16, 1e-4, 0, 0.3), 1: FrameNoise(16, 1e-3, 0, 0.1)}
+    assert next_to_grow(bent, 0.1) == (0, 32)
+    spp = expected_spp(bent, 0.1)
+    assert expected_error(bent[i].at(n) for i, n in spp.items()) <= 0.1
+
+
 def test_the_error_of_the_mean_is_that_of_frames_added_up():
-    assert standard_error([FrameNoise(64, 0.09, 0.16)]) == pytest.approx(0.5)
-    assert standard_error([FrameNoise(64, 0.25, 0.0)] * 4) == pytest.approx(0.25)
-    assert standard_error([]) == 0
+    assert expected_error([FrameNoise(64, 0.09, 0.16)]) == pytest.approx(0.5)
+    assert expected_error([FrameNoise(64, 0.25, 0.0)] * 4) == pytest.approx(0.25)
+    assert expected_error([]) == 0
 
 
 def test_what_gains_most_grows_first_and_no_further_than_asked_for():
@@ -91,10 +108,10 @@ def test_what_gains_most_grows_first_and_no_further_than_asked_for():
     assert next_to_grow(noises, 1.0) is None
     assert next_to_grow({5: FrameNoise(64, 1, 0), 2: FrameNoise(64, 1, 0)}, 0.1) == (2, 128)
     spp = expected_spp(noises, 0.1)
-    assert standard_error(noises[i].at(n) for i, n in spp.items()) <= 0.1
-    assert spp[3] > spp[0] == FEWEST_SPP
+    assert expected_error(noises[i].at(n) for i, n in spp.items()) <= 0.1
+    assert spp[3] > spp[0] == 64
     halved = {i: n // 2 if n > noises[i].spp else n for i, n in spp.items()}
-    assert standard_error(noises[i].at(n) for i, n in halved.items()) > 0.1
+    assert expected_error(noises[i].at(n) for i, n in halved.items()) > 0.1
 
 
 def test_growing_ends_at_the_most_samples():

@@ -10,7 +10,7 @@ import onespp.render.tracer.reference
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.job import RenderJob, render_sequence
-from onespp.render.reference_error import FEWEST_SPP, frame_noise, standard_error
+from onespp.render.reference_error import FEWEST_SPP, expected_error, frame_noise
 from onespp.render.tracer.renderer import Renderer
 from tests.render.tracer.test_renderer import small_scene
 
@@ -31,7 +31,7 @@ def decibels(tmp_path_factory) -> float:
     """An error for which the fewest samples are too few: a third of theirs."""
     sequence = render_sequence(job(1e6), tmp_path_factory.mktemp("fewest") / "s")
     assert [sequence.reference_spp(i) for i in FRAMES] == [FEWEST_SPP] * len(FRAMES)
-    return standard_error(noises(sequence)) / 3
+    return expected_error(noises(sequence)) / 3
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def undisturbed(tmp_path_factory, decibels) -> FrameSequence:
 
 
 def test_references_grow_until_the_error_is_as_asked_for(undisturbed, decibels):
-    assert 0.5 * decibels < standard_error(noises(undisturbed)) <= decibels
+    assert 0.5 * decibels < expected_error(noises(undisturbed)) <= decibels
     spp = [undisturbed.reference_spp(i) for i in FRAMES]
     assert max(spp) > FEWEST_SPP
     assert all(n % FEWEST_SPP == 0 for n in spp)
@@ -126,7 +126,7 @@ def test_references_of_an_older_version_are_kept_or_made_anew(tmp_path, decibels
     sequence = render_sequence(job(2 * decibels), tmp_path / "s")
     assert (tmp_path / "s/reference/0000.exr").read_bytes() == old
     assert [sequence.has_parts(i) for i in FRAMES] == [False, True, True]
-    assert standard_error([frame_noise(r.parts, r.spp) for r in map(
+    assert expected_error([frame_noise(r.parts, r.spp) for r in map(
         sequence.read_reference, FRAMES[1:])]) <= 2 * decibels
 
 
