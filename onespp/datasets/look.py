@@ -24,6 +24,7 @@ MOST_ATTEMPTS = 20
 DARKEST, BRIGHTEST = 0.1, 0.93  # mean of displayed values, of 1
 _NEAR, _MOST_NEAR = 0.6, 0.3  # metres, and the share of pixels that may be nearer
 _FEWEST_THINGS = 0.02  # the share of pixels that show things
+_MOST_LAMP = 0.06  # the share of pixels that may show lamps
 _MARGIN = 0.15  # metres between the camera and what surrounds a thing
 _BLOCK = 8
 _SAMPLES = 4
@@ -106,6 +107,7 @@ def unlike_a_picture(drawn: Drawn, frames: Iterable[Seen]) -> str | None:
     """Why there is nothing to see in one of the frames, in a word, or None."""
     names = drawn.scene.object_names
     things = [i for i, name in enumerate(names) if name in drawn.things]
+    lamps = [names.index(lamp["name"]) for lamp in drawn.record["lamps"]]
     for frame in frames:
         shown, depth = displayed(frame.color), frame.depth
         if not shown >= DARKEST:  # NaN, too
@@ -116,6 +118,8 @@ def unlike_a_picture(drawn: Drawn, frames: Iterable[Seen]) -> str | None:
             return f"something is in front of frame {frame.index}"
         if np.mean(np.isin(frame.id, things)) < _FEWEST_THINGS:
             return f"frame {frame.index} shows no things"
+        if np.mean(np.isin(frame.id, lamps)) > _MOST_LAMP:
+            return f"a lamp is in front of frame {frame.index}"
     return None
 
 

@@ -31,6 +31,9 @@ from .replay import replay
 from .sampler import FRAME_STREAM, REFERENCE_STREAM, Sobol, keys_from_seed
 from .view import View
 
+_TRACED = {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS}
+"""Channels that take more than the first hit."""
+
 
 class Renderer(View):
     """A view of a scene, ready to render any of its frames in any order."""
@@ -63,7 +66,8 @@ class Renderer(View):
                              f"scene of more lights than '{self.scene.name}' has")
         before = index - 1 if index > 0 else None
         replayed = replay(self, index, before, seed) if set(channels) & set(REPLAY) else {}
-        _ = self.lights  # before the stage is set: to find them moves it
+        if set(channels) & _TRACED:
+            _ = self.lights  # before the stage is set: to find them moves it
         self.stage.set_frame(index)
         planes = self._trace_frame(index, seed, [c for c in channels if c not in REPLAY])
         dr.eval(planes)
@@ -101,7 +105,7 @@ class Renderer(View):
             ray, depth_per_length = rays.at(*self.centres(pixel))
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
             planes = {}
-            if set(channels) & {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS}:
+            if set(channels) & _TRACED:
                 sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
                 radiance = trace(scene, ray, pi, sampler, self.scene.max_depth,
                                  self.candidates, self.lights)

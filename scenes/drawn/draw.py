@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from onespp.scenes.description import Scene
 from onespp.scenes.generated import exposure, lights
 from onespp.scenes.generated.plan import Plan
+from onespp.scenes.materials import diffuse
 
 from .cameras import camera_of
 from .choices import Choices, HeldOut
@@ -27,6 +28,8 @@ from .things import things
 
 T = TypeVar("T")
 _GOLDEN = (math.sqrt(5) - 1) / 2
+_SHADE = diffuse((0.55, 0.55, 0.55))
+"""Of lamps, whose backs are seen here: black ones, as `generated/` has, are holes in a picture."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +92,7 @@ def draw(request: Request) -> Drawn:
         about=f"{family}, light: {light}, camera: {move}, {len(rig.lamps)} lamps, {len(found)} "
               "things",
         shapes=(*stage.shapes, *(thing.shape for thing in found),
-                *(lamp.shape() for lamp in rig.lamps)),
+                *(replace(lamp.shape(), material=_SHADE) for lamp in rig.lamps)),
         camera=camera_of(draft, stage, family, move, speed), frames=r.frames, width=r.width,
         height=r.height, max_depth=7, environment=rig.sky)
     record = {

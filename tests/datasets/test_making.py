@@ -228,12 +228,14 @@ def test_a_camera_in_a_thing_is_noticed(drawn):
 @pytest.mark.parametrize(("change", "words"), [
     ({}, None), ({"color": 1e-4}, "is dark"), ({"color": np.nan}, "is dark"),
     ({"color": 9.0}, "is blown"), ({"depth": 0.3}, "something is in front"),
-    ({"id": -1}, "shows no things")])
+    ({"id": -1}, "shows no things"), ({"lamps": 2}, "a lamp is in front")])
 def test_frames_with_nothing_to_see_are_noticed(drawn, change, words):
-    thing = drawn.scene.object_names.index(drawn.things[0])
-    values = {"color": 0.2, "depth": 3.0, "id": thing, **change}
+    thing, lamp = (drawn.scene.object_names.index(name) for name in (
+        drawn.things[0], drawn.record["lamps"][0]["name"]))
+    values = {"color": 0.2, "depth": 3.0, "id": thing, "lamps": 0, **change}
     seen = look.Seen(1, np.full((16, 16, 3), values["color"]), np.full((16, 16), values["id"]),
                      np.full((16, 16), values["depth"]))
+    seen.id[:values["lamps"]] = lamp
     why = look.unlike_a_picture(drawn, [seen])
     assert why is None if words is None else words in (why or "")
 
