@@ -197,7 +197,7 @@ class DataSet:
         """Add what went wrong to the sequence's log."""
         path = self._failure(number)
         before = path.read_text("utf-8") if path.exists() else ""
-        said = "".join(traceback.format_exception(error))
+        said = "".join(traceback.format_exception(error)) + getattr(error, "log", "")
         write_text(path, f"{before}{said}\n")
 
     def failed(self) -> list[int]:

@@ -3,6 +3,10 @@
 Who makes a sequence holds a lock on its folder (`render/files/lock.py`), which ends with the
 process: another one that comes across it goes on to the next. So parts need not be dealt out, and
 what a killed process left unfinished is gone on with by the next that comes.
+
+One that failed is made by a fresh process with one thread: it has the memory that a process which
+made others still holds (some 400 MiB, at 128x128), and if the system kills it for what
+it takes, it alone ends.
 """
 
 from __future__ import annotations
@@ -10,12 +14,14 @@ from __future__ import annotations
 import errno
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from onespp.render.errors import InputError
 from onespp.render.files.lock import Busy, writing
 from onespp.render.progress import Progress, silent
 
 from .folder import DataSet, Made
+from .processes import call
 
 _OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)
 
@@ -63,12 +69,44 @@ def make(data: DataSet, number: int, progress: Progress = silent) -> Made:
         return data.finish_sequence(number, fingerprint, chosen.drawn.record, chosen.rejected)
 
 
+def make_alone(data: DataSet, number: int, progress: Progress = silent) -> None:
+    """Make a sequence with less memory: in a process of its own, with one thread.
+
+    Raises:
+        Busy, InputError: as `make`; a `CallFailed` where the process died.
+    """
+    said = call(_MADE_BY, str(data.folder.resolve()), number,
+                look=lambda: progress(0, 1, f"sequence {number}, alone"))
+    if said == _BUSY:
+        raise Busy(f"{data.place(number)} is being written by another process")
+    if said is not None:
+        raise InputError(said["sentence"]) from OSError(said["errno"], said["sentence"])
+
+
+_MADE_BY = f"{__name__}:_alone"
+_BUSY = "busy"
+
+
+def _alone(folder: str, number: int) -> str | dict[str, object] | None:
+    from onespp.render.host import backend
+
+    backend.set_threads(1)
+    try:
+        make(DataSet.open(Path(folder)), number)
+    except Busy:
+        return _BUSY
+    except InputError as error:
+        if not _is_of_the_disk(error):
+            raise
+        return {"sentence": str(error), "errno": getattr(_cause(error), "errno", 0)}
+
+
 def make_all(data: DataSet, numbers: Iterable[int], progress: Progress = silent,
              tell: Callable[[str], None] = lambda sentence: None) -> Outcome:
     """Make sequences that are not whole yet.
 
     One that fails does not stop the others: what went wrong is in its log, it gets a second try
-    when the others are done, and then it is listed.
+    with less memory when the others are done, and then it is listed.
 
     Raises:
         InputError: the disk refuses. KeyboardInterrupt: what was finished is kept.
@@ -77,6 +115,7 @@ def make_all(data: DataSet, numbers: Iterable[int], progress: Progress = silent,
     there = {*data.numbers()}
     outcome = Outcome([n for n in numbers if n in there])
     waiting, what = [n for n in numbers if n not in there], f"data set {data.plan.name}"
+    failed: list[int] = []
     for last in (False, True):
         again: list[int] = []
         outcome.elsewhere = []
@@ -86,7 +125,7 @@ def make_all(data: DataSet, numbers: Iterable[int], progress: Progress = silent,
                          f"sequence {number}")
 
             try:
-                make(data, number, follow)
+                (make_alone if number in failed else make)(data, number, follow)
                 outcome.made.append(number)
             except Busy:
                 again.append(number)
@@ -94,9 +133,9 @@ def make_all(data: DataSet, numbers: Iterable[int], progress: Progress = silent,
             except Exception as error:
                 if _is_of_the_disk(error):
                     raise
-                again += note_failure(data, outcome, number, error, last, tell)
+                failed += note_failure(data, outcome, number, error, last, tell)
             progress(len(outcome.made), len(numbers), what)
-        waiting = again
+        waiting = sorted([*again, *failed])
     return outcome
 
 
@@ -130,8 +169,12 @@ def part_of(numbers: Iterable[int], part: str | None) -> list[int]:
 
 
 def _is_of_the_disk(error: BaseException) -> bool:
-    cause = error if isinstance(error, OSError) else error.__cause__
+    cause = _cause(error)
     return isinstance(cause, OSError) and cause.errno in _OF_THE_DISK
+
+
+def _cause(error: BaseException) -> BaseException | None:
+    return error if isinstance(error, OSError) else error.__cause__
 
 
 def in_a_line(error: BaseException) -> str:

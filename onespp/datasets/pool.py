@@ -24,7 +24,7 @@ from onespp.render.host import backend
 from onespp.render.progress import Progress, silent
 
 from .folder import DataSet
-from .making import Outcome, in_a_line, make, note_failure
+from .making import Outcome, in_a_line, make, make_alone, note_failure
 
 LOCAL = "local"
 _SECONDS_TO_CONNECT = 15
@@ -37,7 +37,8 @@ def make_by_pool(data: DataSet, numbers: Iterable[int], address: str, workers: i
                  tell: Callable[[str], None] = lambda sentence: None) -> Outcome:
     """Make sequences that are not whole yet, on the workers of a scheduler.
 
-    One that fails gets a second try, and then it is listed.
+    One that fails, or whose workers died three times, gets a second try with less memory, and then
+    it is listed.
 
     Args:
         address: of a scheduler, as tcp://HOST:8786, whose workers see the folder by the same path;
@@ -57,7 +58,7 @@ def make_by_pool(data: DataSet, numbers: Iterable[int], address: str, workers: i
             threads = threads or max(1, (os.cpu_count() or 1) // _workers(workers))
         for last in (False, True):
             # A new key for the second try: a task that has failed is remembered as that.
-            tasks = {client.submit(task, folder, n, threads, retries=0, pure=False,
+            tasks = {client.submit(task, folder, n, threads, last, retries=0, pure=False,
                                    key=f"{data.plan.key}-{n}-{int(last)}"): n for n in waiting}
             waiting = []
             progress(len(outcome.made), len(numbers), what)
@@ -85,10 +86,13 @@ def _as_they_end(tasks: Mapping[Any, int], look: Callable[[], None]) -> Iterator
             time.sleep(_SECONDS_BETWEEN_LOOKS)
 
 
-def task(folder: str, number: int, threads: int | None) -> tuple[str, str]:
-    """Make a sequence in a worker; its folder, and the hash of its files."""
-    _set_threads_once(threads)
+def task(folder: str, number: int, threads: int | None, alone: bool = False) -> tuple[str, str]:
+    """Make a sequence in a worker, or in a process beside it; its folder, and the hash of its
+    files."""
     data = DataSet.open(Path(folder))
+    if alone:
+        when_free(lambda: make_alone(data, number), _SECONDS_FOR_ANOTHER, 0.5)
+    _set_threads_once(threads)
     made = when_free(lambda: make(data, number), _SECONDS_FOR_ANOTHER, 0.5)
     return str(data.place(number)), made.digest
 

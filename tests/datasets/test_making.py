@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -115,6 +117,7 @@ def test_a_sequence_that_fails_is_tried_twice_and_does_not_stop_the_others(monke
         return works(data, number)
 
     monkeypatch.setattr(making, "make", make)
+    monkeypatch.setattr(making, "make_alone", make)
     told: list[str] = []
     outcome = making.make_all(data, range(3), tell=told.append)
     assert tried == [0, 1, 2, 1]
@@ -125,6 +128,45 @@ def test_a_sequence_that_fails_is_tried_twice_and_does_not_stop_the_others(monke
     monkeypatch.setattr(making, "make", works)
     assert making.make_all(data, range(3)).made == [0, 2, 1]
     assert data.failed() == []
+
+
+def test_where_memory_ran_out_a_process_of_its_own_makes_the_same_bytes(made, copy, monkeypatch):
+    whole = files(copy.folder)
+    for path in (copy.place(1) / "sequence.json", *copy.place(1).glob("seed*/frames/0002.exr")):
+        path.unlink()
+
+    def make(data: DataSet, number: int, progress=None) -> Made:
+        raise MemoryError
+
+    monkeypatch.setattr(making, "make", make)
+    told: list[str] = []
+    outcome = making.make_all(copy, range(2), tell=told.append)
+    assert (outcome.made, outcome.failed) == ([0, 1], {})
+    assert told == ["sequence 1 failed and gets a second try: MemoryError()"]
+    copy.finish()
+    assert files(copy.folder) == whole
+
+
+def test_a_process_that_the_system_kills_ends_nothing_else(monkeypatch, quick):
+    """The process is this Python, told to kill itself in the middle of a call."""
+    data, _ = quick
+    monkeypatch.setattr(making, "_MADE_BY", "tests.datasets.test_making:killed")
+    works = making.make
+
+    def make(data: DataSet, number: int, progress=None) -> Made:
+        if number == 1:
+            raise MemoryError
+        return works(data, number)
+
+    monkeypatch.setattr(making, "make", make)
+    outcome = making.make_all(data, range(3))
+    assert outcome.made == [0, 2]
+    assert outcome.failed == {1: "its process was killed, as systems do where memory runs out"}
+    assert data.failed() == [1]
+
+
+def killed(folder: str, number: int) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def test_a_full_disk_ends_it(monkeypatch, quick):
