@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 from onespp.render.channels import TRAINING
 from onespp.render.files.behind import writing_behind
 from onespp.render.files.json_file import checked
+from onespp.render.files.lock import when_free, writing
 from onespp.render.files.manifest import Manifest, first_difference
 from onespp.render.files.sequence import FrameSequence, another
 from onespp.render.host.machine import machine
@@ -26,6 +28,8 @@ from onespp.scenes.fingerprint import fingerprint, later_fingerprints
 
 from .errors import InputError
 from .host import backend
+
+_SECONDS_FOR_OTHERS = 60.0
 
 
 @dataclass(frozen=True)
@@ -123,10 +127,13 @@ class RenderJob:
 
 def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
                     progress: Progress = silent,
-                    tell: Callable[[str], None] = lambda sentence: None) -> FrameSequence:
+                    tell: Callable[[str], None] = lambda sentence: None,
+                    part: Sequence[int] | None = None) -> FrameSequence:
     """Render what the folder does not hold yet.
 
     Args:
+        part: which of the job's frames, None: all. The others are left to other processes, which
+            may write into the folder meanwhile.
         progress: told of the frames that are done, and of the references, in fractions.
         tell: told what references of a wanted error are expected to cost, before they are rendered.
 
@@ -140,15 +147,17 @@ def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
     manifest = job.manifest()
     if not overwrite:
         _check_later_frames(job, folder, manifest)
-    sequence = FrameSequence.create(folder, manifest, overwrite)
+    with nullcontext() if part is None else _changing_manifest(folder):
+        sequence = FrameSequence.create(folder, manifest, overwrite)
+    frames = job.frames if part is None else part
     provenance = {"software": f"onespp {versions()['onespp']}", "scene": job.scene.name,
                   "sceneFingerprint": sequence.manifest.fingerprint, "seed": str(job.seed),
                   "maxDepth": str(job.scene.max_depth), "direct": job.direct,
                   "sampler": job.sampler}
-    count = len(job.frames)
+    count = len(frames)
     what = f"render {job.scene.name} {job.width}x{job.height}"
     with writing_behind() as hand_over:
-        for done, index in enumerate(job.frames, 1):
+        for done, index in enumerate(frames, 1):
             if not sequence.frame_is_whole(index):
                 hand_over(sequence.write_frame,  # (a name here would keep a third frame alive)
                           job.renderer.frame(index, job.seed, job.channel_names()),
@@ -158,14 +167,23 @@ def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
         references = References(job.renderer, sequence, job.seed, job.antialias, provenance)
         what = f"reference, {spp} spp"
         if job.reference_error is not None:
-            references.grow_to_error(job.frames, job.reference_error, progress, tell)
+            references.grow_to_error(frames, job.reference_error, progress, tell)
         else:
-            for done, index in enumerate(job.frames):
+            for done, index in enumerate(frames):
                 references.grow(index, spp, lambda part, whole, *_, done=done: progress(
                     done + part / whole, count, what))
                 progress(done + 1, count, what)
-        sequence = sequence.with_reference_spp()
+        if part is None:
+            sequence = sequence.with_reference_spp()
     return sequence
+
+
+@contextmanager
+def _changing_manifest(folder: Path) -> Iterator[None]:
+    """Waits for others who write other frames into the folder."""
+    with ExitStack() as held:
+        when_free(lambda: held.enter_context(writing(folder, "manifest")), _SECONDS_FOR_OTHERS, 0.1)
+        yield
 
 
 def _check_later_frames(job: RenderJob, folder: Path, manifest: Manifest) -> None:

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from onespp.datasets.folder import DataSet
-from onespp.datasets.making import make_all, part_of
+from onespp.datasets.making import make_all
 from onespp.datasets.plan import Plan, changed_plan, read_plan
 from onespp.datasets.pool import make_by_pool
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_bytes
+from onespp.render.files.frame_ranges import part_of
 from onespp.render.host.memory import require_memory
 from onespp.render.host.turns import turn
 from onespp.render.host.versions import versions

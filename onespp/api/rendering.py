@@ -9,11 +9,12 @@ import tempfile
 from collections.abc import Iterable
 from numbers import Integral
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from onespp.render.channels import asked_channels
 from onespp.render.errors import InputError
-from onespp.render.files.frame_ranges import parse_frames
-from onespp.render.files.lock import writing
+from onespp.render.files.frame_ranges import parse_frames, part_of
+from onespp.render.files.lock import writing, writing_share
 from onespp.render.files.manifest import DIRECT, JITTERS, SAMPLERS
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.host.memory import require_memory
@@ -24,6 +25,9 @@ from onespp.scenes.description import Scene
 from .caller import caller, public
 from .loading import load
 
+if TYPE_CHECKING:
+    from onespp.render.job import RenderJob
+
 LARGEST_SIDE = 16384
 
 
@@ -33,7 +37,7 @@ def render(scene: str | Path | Scene, out: Path | str | None = None, *,
            seed: int = 0, reference_spp: int | None = None, reference_error: float | None = None,
            antialias: bool = False, channels: str | Iterable[str] | None = None,
            half: bool = False, direct: str = "resampled", sampler: str = "zsobol",
-           jitter: str = "none", overwrite: bool = False) -> FrameSequence:
+           jitter: str = "none", overwrite: bool = False, part: str | None = None) -> FrameSequence:
     """Render frames of a scene at one sample a pixel.
 
     What the folder holds already is not rendered again: the same call goes on where it was stopped.
@@ -59,6 +63,9 @@ def render(scene: str | Path | Scene, out: Path | str | None = None, *,
         jitter: "halton" moves all rays of a frame by an offset of its own within the pixel, for
             temporal anti-aliasing (compare with references of `antialias`); "none".
         overwrite: replace another sequence in the folder.
+        part: "K/N" renders every N-th frame only, from the K-th on. Other processes may render the
+            other parts into the folder at the same time; the same call without it, in the end,
+            checks that all is there.
 
     Returns:
         The sequence. Its frames have (h, w, 3) float32 linear Rec. 709 radiance in `color`, and
@@ -95,8 +102,14 @@ def render(scene: str | Path | Scene, out: Path | str | None = None, *,
                     direct, sampler, who.command(), added, text == "training",
                     half, reference_error, jitter)
     folder = _temporary() if out is None else Path(out)
-    with writing(folder, "render", alone=overwrite), who.progress() as report:
-        sequence = render_sequence(job, folder, overwrite=overwrite, progress=report, tell=who.tell)
+    chosen = None if part is None else _chosen(job, part, overwrite)
+    held = (writing(folder, "render", alone=overwrite) if part is None else
+            writing_share(folder, "render", part.replace("/", "-of-")))
+    with held, who.progress() as report:
+        sequence = render_sequence(job, folder, overwrite=overwrite, progress=report, tell=who.tell,
+                                   part=chosen)
+    if chosen is not None:
+        return sequence
     if job.fewest_spp is not None:
         for sentence in reference_notes(sequence, numbers, reference_spp):
             who.inform(sentence)
@@ -155,6 +168,21 @@ def _numbers(frames: int | Iterable[int] | None, scene: Scene) -> tuple[int, ...
         raise InputError(f"--frames is {frames!r}: use how many, or their numbers, as "
                          "range(4, 8)")
     return parse_frames(",".join(map(str, frames)))
+
+
+def _chosen(job: RenderJob, part: str, overwrite: bool) -> list[int]:
+    """The frames of a part; InputError where what is asked for takes all of them."""
+    chosen = part_of(job.frames, part)
+    if not chosen:
+        raise InputError(f"--part {part} of {len(job.frames)} frames has none: use fewer parts")
+    for name, asked, why in (
+            ("--overwrite", overwrite, "removes what others render: remove the folder first"),
+            ("--reference-error", job.reference_error is not None,
+             "looks at all frames: use --reference-spp, or ask for the error in the end, without "
+             "--part")):
+        if asked:
+            raise InputError(f"{name} does not go with --part, as it {why}")
+    return chosen
 
 
 def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:

@@ -150,24 +150,6 @@ def note_failure(data: DataSet, outcome: Outcome, number: int, error: BaseExcept
     return [number]
 
 
-def part_of(numbers: Iterable[int], part: str | None) -> list[int]:
-    """Every N-th of the numbers, from the K-th on, for a part 'K/N'; None: all.
-
-    Example:
-        >>> part_of(range(8), "2/3")
-        [1, 4, 7]
-
-    Raises:
-        InputError: not of this form.
-    """
-    if part is None:
-        return list(numbers)
-    k, slash, n = part.partition("/")
-    if not (slash and k.isdigit() and n.isdigit() and 1 <= int(k) <= int(n)):
-        raise InputError(f"--part is {part[:40]!r}: use K/N, as 1/4 to 4/4")
-    return list(numbers)[int(k) - 1::int(n)]
-
-
 def _is_of_the_disk(error: BaseException) -> bool:
     cause = _cause(error)
     return isinstance(cause, OSError) and cause.errno in _OF_THE_DISK

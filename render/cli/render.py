@@ -20,6 +20,10 @@ from .terminal import progress
 @click.argument("scene")
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
               help="Folder of the sequence; default data/SCENE.")
+@click.option("--part", metavar="K/N",
+              help="Every N-th frame only, from the K-th on, also beside processes that render the "
+              "other parts into the same folder; then the same command without it checks that all "
+              "is there.")
 @render_options
 def render(scene: str, out: Path | None, device: str, threads: int | None, **options) -> None:
     """Render SCENE (a name, a Python file, or a Mitsuba XML file) at one sample a pixel.

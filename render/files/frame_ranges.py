@@ -1,4 +1,4 @@
-"""Frame numbers as text: '0:20' is 0 to 19."""
+"""Frame numbers as text: '0:20' is 0 to 19; and which of some numbers a part '2/8' has."""
 
 from __future__ import annotations
 
@@ -58,3 +58,21 @@ def spread(frames: list[int], count: int | None) -> list[int]:
     if count is None or len(frames) <= count:
         return frames
     return [frames[i] for i in np.linspace(0, len(frames) - 1, count).round().astype(int)]
+
+
+def part_of(numbers: Iterable[int], part: str | None) -> list[int]:
+    """Every N-th of the numbers, from the K-th on, for a part 'K/N'; None: all.
+
+    Example:
+        >>> part_of(range(8), "2/3")
+        [1, 4, 7]
+
+    Raises:
+        InputError: not of this form.
+    """
+    if part is None:
+        return list(numbers)
+    k, slash, n = part.partition("/")
+    if not (slash and k.isdigit() and n.isdigit() and 1 <= int(k) <= int(n)):
+        raise InputError(f"--part is {part[:40]!r}: use K/N, as 1/4 to 4/4")
+    return list(numbers)[int(k) - 1::int(n)]

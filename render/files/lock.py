@@ -6,7 +6,9 @@ whatever process or host it names. Its text says who writes, for the message to 
 
 Parts are what commands write: `render` (frames and references; an import too), `denoise-METHOD`,
 `time`, `score`, `report`; of a data set `dataset`, and `sequence` in the folder of each of its
-scenes. Different parts may be written at once. Where the system or the file system knows no locks
+scenes. Different parts may be written at once. So may shares of one part, as of other frames, by as
+many processes: who writes a share also holds the part's lock, together with those who write others,
+so that nobody writes the whole part meanwhile. Where the system or the file system knows no locks
 (Windows; some network drives) writers are not told of each other.
 """
 
@@ -39,7 +41,8 @@ _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 _RESULTS = "denoise-"
 _PLACES = {"render": ("frames/*", "reference/*", "*.manifest.json"), "time": ("*.times.json",),
            "score": ("pictures/*", "*.scores.*"), "report": ("report/**/*",),
-           "dataset": ("*.dataset.json", "*.README.md"), "sequence": ("*.sequence.json",)}
+           "manifest": ("*.manifest.json",), "dataset": ("*.dataset.json", "*.README.md"),
+           "sequence": ("*.sequence.json",)}
 
 
 class Busy(InputError):
@@ -88,6 +91,26 @@ def writing(folder: Path, part: str, alone: bool = False) -> Iterator[None]:
                 folder.rmdir()
 
 
+@contextmanager
+def writing_share(folder: Path, part: str, share: str) -> Iterator[None]:
+    """Holds the lock on a share of a part, as "2-of-8", beside others who write other shares.
+
+    What killed writers left half written is left to who writes the whole part next.
+
+    Raises:
+        InputError: as `writing`.
+    """
+    with ExitStack() as held:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            held.enter_context(_locked(folder / f".{part}.lock", shared=True))
+            held.enter_context(_locked(folder / f".{part}-{share}.lock"))
+        except OSError as error:
+            raise InputError(explain(folder, error)) from error
+        check_links(folder)
+        yield
+
+
 def _take(held: ExitStack, folder: Path, part: str, alone: bool) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -99,8 +122,8 @@ def _take(held: ExitStack, folder: Path, part: str, alone: bool) -> None:
 
 
 @contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    descriptor = _open(path)
+def _locked(path: Path, shared: bool = False) -> Iterator[None]:
+    descriptor = _open(path, shared)
     try:
         who = (f"process {os.getpid()} on {platform.node()} since "
                f"{datetime.datetime.now().astimezone().isoformat(' ', 'seconds')}")
@@ -109,18 +132,20 @@ def _locked(path: Path) -> Iterator[None]:
             os.write(descriptor, who.encode())
         yield
     finally:
-        with contextlib.suppress(OSError):
-            path.unlink()  # while it is locked, so that it is ours
+        if not shared:  # others may hold it
+            with contextlib.suppress(OSError):
+                path.unlink()  # while it is locked, so that it is ours
         os.close(descriptor)
 
 
-def _open(path: Path) -> int:
+def _open(path: Path, shared: bool) -> int:
     """A descriptor that has the lock; InputError where another has it."""
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
         try:
             if fcntl is not None:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX)
+                            | fcntl.LOCK_NB)
         except BlockingIOError:
             who = os.read(descriptor, 300).decode(errors="replace")
             os.close(descriptor)

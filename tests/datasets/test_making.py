@@ -20,6 +20,7 @@ from onespp.datasets import look, making
 from onespp.datasets.folder import DataSet, DataSetFile, Made
 from onespp.datasets.plan import Plan, changed_plan, read_plan
 from onespp.render.errors import InputError
+from onespp.render.files.frame_ranges import part_of
 from onespp.render.files.json_file import read_json
 from onespp.render.files.lock import writing
 from onespp.scenes.description import Camera
@@ -196,11 +197,11 @@ def test_a_sequence_that_another_process_makes_is_left_to_it(quick):
 
 
 def test_parts_make_all_between_them():
-    parts = [making.part_of(range(7), f"{k}/3") for k in (1, 2, 3)]
+    parts = [part_of(range(7), f"{k}/3") for k in (1, 2, 3)]
     assert sorted(n for part in parts for n in part) == [*range(7)]
     for part in ("0/3", "4/3", "1", "a/b"):
         with pytest.raises(InputError, match="use K/N"):
-            making.part_of(range(7), part)
+            part_of(range(7), part)
 
 
 def test_a_folder_holds_one_data_set_which_may_grow(quick, plan, tmp_path):
