@@ -1,8 +1,8 @@
-"""A data set in other layouts: as shards for WebDataset, and as zarr.
+"""A data set in other layouts: as shards for WebDataset, as zarr, and as Noisebase has it.
 
-Arrays are (frames, h, w) or (frames, h, w, c), of the channels that files have and in their types,
-`reference` and `reference-half` (its first half minus itself), and the matrices. Beside them is
-what was drawn.
+Of the first two, arrays are (frames, h, w) or (frames, h, w, c), of the channels that files have
+and in their types, `reference` and `reference-half` (its first half minus itself), and the
+matrices. Beside them is what was drawn.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from onespp.render.errors import InputError
 from onespp.render.files.atomic import replacing
 from onespp.render.progress import Progress, silent
 
+from .noisebase import write_description, write_sequence
 from .store import HALF, MATRICES, REFERENCE, whole
 
 SHARD_BYTES = 256 << 20
@@ -35,7 +36,7 @@ def export(data: DataSet, layout: str, out: Path, progress: Progress = silent) -
             something, or the disk refuses.
     """
     if layout not in LAYOUTS:
-        raise InputError(f"--format is {layout!r}: use {' or '.join(LAYOUTS)} for a data set")
+        raise InputError(f"--format is {layout!r}: use {', '.join(LAYOUTS)} for a data set")
     if out.exists() and any(out.iterdir()):
         raise InputError(f"{out} holds files already: use another --out")
     return LAYOUTS[layout](data, out, progress)
@@ -72,14 +73,7 @@ def webdataset(data: DataSet, out: Path, progress: Progress = silent) -> int:
 
 def zarr(data: DataSet, out: Path, progress: Progress = silent) -> int:
     """A zarr 3 store: SPLIT/NUMBER/sK/CHANNEL, a shard a channel, a frame a chunk, zstd."""
-    try:
-        import zarr as library
-    except ImportError:
-        raise InputError("--format zarr needs a package that is not installed: pip install "
-                         "'onespp[zarr]'") from None
-    if int(library.__version__.partition(".")[0]) < 3:
-        raise InputError(f"zarr is version {library.__version__}: pip install 'onespp[zarr]' "
-                         "for version 3, which has shards")
+    library = _zarr("zarr")
     done = 0
     root = library.open_group(str(out), mode="w", zarr_format=3,
                               attributes={"plan": data.plan.model_dump(mode="json")})
@@ -95,8 +89,34 @@ def zarr(data: DataSet, out: Path, progress: Progress = silent) -> int:
     return done
 
 
+def noisebase(data: DataSet, out: Path, progress: Progress = silent) -> int:
+    """SPLIT/scene0000.zip and SPLIT.yaml, see `noisebase.py`."""
+    library, done = _zarr("noisebase"), 0
+    for split in SPLITS:
+        numbers = data.numbers(split)
+        for index, number in enumerate(numbers):
+            write_sequence(library, data, number, out / split / f"scene{index:04d}.zip")
+            done += 1
+            progress(done, len(data.numbers()), "export")
+        if numbers:
+            write_description(data, split, len(numbers), out / f"{split}.yaml")
+    return done * data.plan.seeds
+
+
+def _zarr(layout: str) -> Any:
+    try:
+        import zarr as library
+    except ImportError:
+        raise InputError(f"--format {layout} needs a package that is not installed: pip install "
+                         "'onespp[zarr]'") from None
+    if int(library.__version__.partition(".")[0]) < 3:
+        raise InputError(f"zarr is version {library.__version__}: pip install 'onespp[zarr]' "
+                         "for version 3, which has shards")
+    return library
+
+
 LAYOUTS: dict[str, Callable[[DataSet, Path, Progress], int]] = {
-    "zarr": zarr, "webdataset": webdataset}
+    "zarr": zarr, "webdataset": webdataset, "noisebase": noisebase}
 
 
 def _arrays(data: DataSet, number: int, k: int) -> dict[str, np.ndarray]:

@@ -46,7 +46,7 @@ def render_to(name: str, out: Path | None, *, frames: str | None = None, size: s
                       size=None if size is None else parse_size(size), **options)
 
 
-DATA_SET_FORMATS = ("zarr", "webdataset")
+DATA_SET_FORMATS = ("zarr", "webdataset", "noisebase")
 
 
 @click.command()
@@ -55,7 +55,7 @@ DATA_SET_FORMATS = ("zarr", "webdataset")
               help="Folder for the files; default FOLDER/games202, of a data set FOLDER-FORMAT.")
 @click.option("--format", "layout", type=click.Choice(["games202", *DATA_SET_FORMATS]),
               default="games202", show_default=True,
-              help="The other layout; of a data set zarr or webdataset.")
+              help="The other layout; of a data set zarr, webdataset or noisebase.")
 def export(folder: Path, out: Path | None, layout: str) -> None:
     """Write the frames of the sequence, or of the data set, in FOLDER in another layout."""
     if layout in DATA_SET_FORMATS:
