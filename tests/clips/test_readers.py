@@ -1,0 +1,42 @@
+"""The examples of docs/datasets.md: clips through the loaders of PyTorch and of JAX's Grain."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from onespp.clips.clips import Clips
+
+EXAMPLES = Path(__file__).parents[2] / "docs/examples"
+
+
+def test_torch_reads_batches(made):
+    torch = pytest.importorskip("torch")
+    clips = Clips(made.folder, frames=1, crop=16, channels=("color",))
+    loader = torch.utils.data.DataLoader(clips, batch_size=2)
+    for epoch in range(2):
+        clips.set_epoch(epoch)
+        batch = next(iter(loader))
+        assert batch["color"].shape == (2, 1, 16, 16, 3)
+        assert np.array_equal(batch["color"][1], clips[1]["color"])
+
+
+def test_grain_reads_batches_for_jax(made):
+    grain = pytest.importorskip("grain")
+    numpy = pytest.importorskip("jax.numpy")
+    clips = Clips(made.folder, frames=1, crop=16, channels=("color",))
+    loader = grain.MapDataset.source(clips).shuffle(seed=0).batch(2).to_iter_dataset()
+    batch = next(iter(loader))
+    assert numpy.asarray(batch["color"]).shape == (2, 1, 16, 16, 3)
+    assert set(np.asarray(batch["frame"]).tolist()) <= {0, 1, 2}
+    assert any(np.array_equal(batch["color"][0], clip["color"]) for clip in clips)
+
+
+def test_the_network_of_the_example_learns(made):
+    pytest.importorskip("torch")
+    train = runpy.run_path(str(EXAMPLES / "unet_torch.py"))["train"]
+    losses = train(str(made.folder), 6, crop=16, batch=3, workers=0)
+    assert min(losses[3:]) < losses[0]
