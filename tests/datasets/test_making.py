@@ -23,6 +23,7 @@ from onespp.render.errors import InputError
 from onespp.render.files.frame_ranges import part_of
 from onespp.render.files.json_file import read_json
 from onespp.render.files.lock import writing
+from onespp.render.files.sequence import FrameSequence
 from onespp.scenes.description import Camera
 from onespp.scenes.drawn.draw import Drawn, draw
 
@@ -297,3 +298,32 @@ def test_a_draw_that_is_rejected_is_drawn_again(monkeypatch, plan):
     monkeypatch.setattr(look, "MOST_ATTEMPTS", 2)
     with pytest.raises(InputError, match="none of 2 draws of sequence 0 of 'simple'"):
         look.usable(plan, 0)
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 2 MiB."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    mounted = ["mount", "-t", "tmpfs", "-o", "size=2m", "onespp-test", str(place)]
+    if shutil.which("mount") is None or subprocess.run(mounted, capture_output=True).returncode:
+        pytest.skip("this process may not mount a file system")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
+def test_a_disk_that_fills_leaves_whole_files_and_is_gone_on_with(made, small_disk):
+    """A real one, full but for what a sequence and a half takes; then there is room again."""
+    ballast = small_disk / "ballast"
+    took = sum(len(text) for text in files(made.place(0)).values())
+    free = os.statvfs(small_disk)
+    ballast.write_bytes(bytes(free.f_bavail * free.f_frsize - 3 * took // 2))
+    with pytest.raises(InputError, match="because the disk is full"):
+        onespp.dataset(made.plan, small_disk / "set")
+    data = DataSet.open(small_disk / "set")
+    assert data.status().left > 0
+    for path in data.folder.rglob("frames/*.exr"):
+        FrameSequence.open(path.parents[1]).read_frame(int(path.stem))
+    ballast.unlink()
+    assert onespp.dataset(made.plan, data.folder).verify() == []
+    assert files(data.folder) == files(made.folder)
