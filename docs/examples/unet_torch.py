@@ -56,13 +56,13 @@ def batches(clips: onespp.Clips, size: int, workers: int) -> Iterator[dict[str, 
 
 
 def train(folder: str, steps: int, crop: int = 64, batch: int = 4, workers: int = 2) -> list[float]:
-    """Trains and prints; the loss of each step, and before them that of the noisy frames."""
+    """Trains and prints; the loss of each step as a share of that of its noisy frames."""
     torch.manual_seed(0)
     clips = onespp.Clips(folder, frames=1, crop=crop, channels=("color", "albedo", "normal",
                                                                 "depth"))
     network = UNet()
     optimizer = torch.optim.Adam(network.parameters(), 1e-3)
-    losses: list[float] = []
+    shares: list[float] = []
     for step, clip in zip(range(steps), batches(clips, batch, workers)):
         color, albedo, normal, truth = (clip[name][:, 0].movedim(-1, 1) for name in (
             "color", "albedo", "normal", "reference"))
@@ -73,11 +73,11 @@ def train(folder: str, steps: int, crop: int = 64, batch: int = 4, workers: int 
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
-        losses.append(loss.item())
+        noisy = (light - torch.log1p(truth)).abs().mean().item()
+        shares.append(loss.item() / noisy)
         if step % max(1, steps // 10) == 0 or step == steps - 1:
-            noisy = (light - torch.log1p(truth)).abs().mean().item()
-            print(f"step {step:4}: loss {losses[-1]:.4f} (noisy frames {noisy:.4f})")
-    return losses
+            print(f"step {step:4}: loss {loss.item():.4f} (noisy frames {noisy:.4f})")
+    return shares
 
 
 if __name__ == "__main__":
