@@ -50,10 +50,12 @@ class Manifest(JsonFile):
     `jitter` says how far a frame's rays are from centres: "none", or "halton" for an offset a
     frame, which its matrices contain. `seed`, `spp`, `max_depth`, `direct`, `sampler`, `jitter` and
     `reference_filter` are None for imports, where nobody knows them (older versions wrote defaults
-    there, which are not read). `objects` are names in order of ID. `fingerprint` is a hash of what
-    the scene describes (or an import holds), so that an edited scene is not taken for the old one;
-    `later` has hashes of frames after the scene's last one, by their number. `commands` are the
-    command lines that made it, as they were typed, in order; `machine` is that of the first.
+    there, which are not read). `objects` are names in order of ID, `moving` those of them that have
+    matrices in the frames' files (the others stand still), None where all have. `fingerprint` is a
+    hash of what the scene describes (or an import holds), so that an edited scene is not taken for
+    the old one; `later` has hashes of frames after the scene's last one, by their number.
+    `commands` are the command lines that made it, as they were typed, in order; `machine` is that
+    of the first.
     """
 
     model_config = ConfigDict(validate_default=True)
@@ -78,6 +80,7 @@ class Manifest(JsonFile):
     channels: Annotated[tuple[str, ...], Field(min_length=1)]
     half: bool = False
     objects: Annotated[tuple[Name, ...], Field(min_length=1)]
+    moving: tuple[Name, ...] | None = None
     fingerprint: str = ""
     later: dict[int, str] = Field(default_factory=dict)
     device: str = ""
@@ -104,6 +107,15 @@ class Manifest(JsonFile):
     @classmethod
     def _unique_objects(cls, objects: tuple[str, ...]) -> tuple[str, ...]:
         return _unique(objects)
+
+    @field_validator("moving")
+    @classmethod
+    def _are_objects(cls, moving: tuple[str, ...] | None,
+                     info: ValidationInfo) -> tuple[str, ...] | None:
+        unknown = {*(moving or ())} - {*info.data.get("objects", moving or ())}
+        if unknown:
+            raise ValueError(f"{min(unknown)[:80]!r} is not one of the objects")
+        return moving
 
 
 # What two manifests of the same sequence have in common. The rest may change from run to run.

@@ -214,7 +214,8 @@ class FrameSequence:
 
     def read_matrices(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """camera_from_world, screen_from_world, world_from_object of a frame, float64."""
-        return read_matrices(self._path("frames", i, "json"), i, self.manifest.objects)
+        return read_matrices(self._path("frames", i, "json"), i, self.manifest.objects,
+                             self.manifest.moving)
 
     def write_frame(self, frame: Frame, provenance: Mapping[str, str] | None = None) -> None:
         """Write a frame's images and matrices; `provenance` goes into the EXR header."""
@@ -226,7 +227,8 @@ class FrameSequence:
         images = {name: frame[name] for name in self.manifest.channels}
         write_text(self._path("frames", frame.index, "json"),
                    format_matrices(frame.index, frame.camera_from_world, frame.screen_from_world,
-                                   dict(zip(objects, frame.world_from_object))))
+                                   dict(zip(objects, frame.world_from_object)),
+                                   self.manifest.moving))
         self._write(self._path("frames", frame.index), images, provenance, half=self.manifest.half)
 
     def has_reference(self, i: int) -> bool:

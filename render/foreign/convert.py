@@ -90,7 +90,8 @@ def import_foreign(folder: Path | str, out: Path | str, conventions: Conventions
         scene=sequence_name(Path(folder)), fingerprint=_digest(repr(conventions), files, truth),
         frames=tuple(files.frames), width=first.width, height=first.height, fps=fps, seed=None,
         channels=tuple(first.images), commands=(command,) if command else (),
-        objects=tuple(f"object_{number}" for number in objects) or ("object_0",)), overwrite)
+        objects=tuple(f"object_{number}" for number in objects) or ("object_0",),
+        moving=()), overwrite)
     try:
         for i in files.frames:
             if not sequence.has_frame(i):

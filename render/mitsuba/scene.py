@@ -87,6 +87,7 @@ class MitsubaScene:
         self.mi_scene = mi.load_dict(scene, parallel=False, optimize=False)
         self._parameters = mi.traverse(self.mi_scene)
         self.id_from_registry, self._id_from_face = self._registry_table(together)
+        self._still = np.stack([shape.world_from_object_at(frame) for shape in description.shapes])
         self._move(frame)  # an updated scene differs from a loaded one by roundings of its rays
 
     def set_frame(self, frame: float) -> None:
@@ -110,22 +111,24 @@ class MitsubaScene:
 
     def world_from_object(self) -> np.ndarray:
         """(n, 4, 4) float64 by object ID, at the current frame."""
-        return np.stack([s.world_from_object_at(self.frame) for s in self.description.shapes])
+        places = self._still.copy()
+        for i, shape in enumerate(self.description.shapes):
+            if shape.moves:
+                places[i] = shape.world_from_object_at(self.frame)
+        return places
 
     def stage_from_stage(self, world_from_object: np.ndarray) -> np.ndarray:
         """(n, 4, 4) float64 by object ID: what objects' points at other places move by to here.
 
         Exactly the identity for an object at rest; NaN for one that was flat there.
         """
-        moves = []
-        for then, now in zip(world_from_object, self.world_from_object(), strict=True):
-            if np.array_equal(then, now):
-                moves.append(np.eye(4))
-            elif np.linalg.det(then) == 0:
-                moves.append(np.full((4, 4), np.nan))
-            else:
-                moves.append(self._local(now) @ np.linalg.inv(self._local(then)))
-        return np.stack(moves)
+        places = self.world_from_object()
+        moves = np.tile(np.eye(4), (len(places), 1, 1))
+        for i in np.flatnonzero((world_from_object != places).any((1, 2))):
+            then, now = world_from_object[i], places[i]
+            moves[i] = (np.nan if np.linalg.det(then) == 0
+                        else self._local(now) @ np.linalg.inv(self._local(then)))
+        return moves
 
     def object_id(self, registry_index: Any, face: Any) -> mi.Int32:
         """Object IDs of shapes by their index in the JIT registry; 0 is no shape, -1.

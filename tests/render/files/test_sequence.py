@@ -117,6 +117,30 @@ def test_matrices_are_a_row_a_line_with_their_names(tmp_path):
     assert max(map(len, text.splitlines())) < 110
 
 
+def test_matrices_of_what_stands_still_are_not_written(tmp_path):
+    """Another object that moves, or an older manifest, which has all: each file by its manifest."""
+    frame, moving = small_frame(0), OBJECTS[1:2]
+    some, all_ = (FrameSequence.create(tmp_path / str(names), small_manifest(moving=names))
+                  for names in (moving, None))
+    for sequence in (some, all_):
+        sequence.write_frame(frame)
+    file = some.folder / "frames/0000.json"
+    assert list(json.loads(file.read_text("utf-8"))["objects"]) == list(moving)
+    back = some.read_frame(0)
+    expected = np.tile(np.eye(4), (len(OBJECTS), 1, 1))
+    expected[1] = frame.world_from_object[1]
+    assert (frame.world_from_object[0] != np.eye(4)).any()
+    np.testing.assert_array_equal(back.world_from_object, expected)
+    np.testing.assert_array_equal(all_.read_frame(0).world_from_object, frame.world_from_object)
+    file.write_bytes((all_.folder / "frames/0000.json").read_bytes())
+    with pytest.raises(InputError, match="disagrees with the manifest about the object 'ball'"):
+        some.read_frame(0)
+    continued = FrameSequence.create(all_.folder, small_manifest(moving=moving))
+    assert continued.manifest.moving is None
+    with pytest.raises(ValueError, match="'another' is not one of the objects"):
+        small_manifest(moving=("another",))
+
+
 @given(st.sets(st.integers(0, 300), min_size=1, max_size=40))
 def test_frame_ranges_read_back_as_written(frames):
     assert parse_frames(format_frames(sorted(frames))) == tuple(sorted(frames))
