@@ -67,4 +67,4 @@ def _unknown(name: str) -> str:
     hint = f"did you mean '{close[0]}'? " if close else ""
     return (f"unknown scene '{name}': {hint}there are {', '.join(sorted(SCENES))}, "
             f"{_HARD}NAME and {GENERATED[0]} to {COUNT - 1} (`onespp scenes` lists them), "
-            "or give the path of a .py file")
+            "or give the path of a .py, .xml, .glb or .gltf file")

@@ -37,7 +37,7 @@ ROOMS = (
     "onespp.denoise.geometry", "onespp.denoise",
     "onespp.render.doctor", "onespp.render.trials", "onespp.render.job",
     "onespp.render.references", "onespp.render.study", "onespp.render.tracer",
-    "onespp.render.scene_files",
+    "onespp.render.gltf", "onespp.render.scene_files",
     "onespp.render.mitsuba", "onespp.render.foreign", "onespp.render.games202",
     "onespp.render", "onespp.render.files", "onespp.render.host",
     "onespp.render.derived", "onespp.render.frame", "onespp.render.guides_camera",
@@ -56,20 +56,20 @@ ONLY_IN = {  # package -> rooms that may import it
     # trials: what `doctor` tries
     **dict.fromkeys(("matplotlib", "PIL", "jinja2", "av"),
                     r"\.denoise\.report(\.|$)|\.render\.trials$"),
-    "mitsuba": r"\.render\.(study|tracer|scene_files|mitsuba|cli|doctor|trials)(\.|$)|"
+    "mitsuba": r"\.render\.(study|tracer|gltf|scene_files|mitsuba|cli|doctor|trials)(\.|$)|"
                r"\.denoise\.peers\.optix$",
 }
 NEVER = {  # module -> what it never imports
     r"^onespp\.denoise\.(metrics|score|geometry|oracles)(\.|$)": r"^drjit",
     r"^onespp\.render\.(files|frame|channels|errors)(\.|$)": r"^(drjit|mitsuba)",
-    r"^onespp\.denoise(\.|$)": r"^onespp\.(scenes|render\.(tracer|scene_files|mitsuba))(\.|$)",
+    r"^onespp\.denoise(\.|$)": r"^onespp\.(scenes|render\.(tracer|gltf|scene_files|mitsuba))(\.|$)",
     r"^onespp\.render(\.|$)": r"^onespp\.denoise(\.|$)",
     # a command parses, calls and prints: images and kernels are below it
     r"^onespp\.(\w+\.)?cli(\.|$)": r"^(numpy|drjit|mitsuba|"
-                                     r"onespp\.render\.(tracer|scene_files|mitsuba))(\.|$)",
+                                     r"onespp\.render\.(tracer|gltf|scene_files|mitsuba))(\.|$)",
     # data loaders' workers
     r"^onespp\.(clips|datasets\.(folder|plan|card))(\.|$)":
-        r"^(drjit|mitsuba|onespp\.render\.(tracer|scene_files|mitsuba|job))(\.|$)",
+        r"^(drjit|mitsuba|onespp\.render\.(tracer|gltf|scene_files|mitsuba|job))(\.|$)",
     r"^onespp\.scenes(\.|$)": r"^(onespp\.(render|denoise)|drjit|mitsuba)(\.|$)",
 }
 

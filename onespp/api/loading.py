@@ -1,4 +1,4 @@
-"""A scene by name, from a file of Python or of Mitsuba's, to render or to set in motion."""
+"""A scene by name, from a file of Python, of Mitsuba's or of glTF, to render or to move."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from pathlib import Path
 
 from onespp.render.errors import InputError
 from onespp.render.host.turns import turn
+from onespp.render.scene_files.loaded import Loaded
 from onespp.scenes import catalog
 from onespp.scenes.description import Scene, SceneError
 
 from .caller import caller, public
 
-_XML = ".xml"
+_XML, _GLTF = ".xml", (".glb", ".gltf")
 
 
 @public
@@ -25,14 +26,14 @@ def load(scene: str | Path | Scene, *, define: Mapping[str, object] | None = Non
     of it, and each of its shapes may get a motion (see `onespp.scenes.animation`).
 
     Args:
-        scene: a name of `onespp.scenes()`, the path of a `.py` file or of a Mitsuba 3 `.xml`
-            file, or a `Scene`, which is returned as it is.
+        scene: a name of `onespp.scenes()`, the path of a `.py` file, a Mitsuba 3 `.xml`
+            file or a glTF 2.0 file (`.glb`, `.gltf`), or a `Scene`, which is returned as it is.
         define: values for the `$name` of an XML file, by name.
-        sensor: which of an XML file's cameras, from 0.
+        sensor: which of an XML or glTF file's cameras, from 0.
 
     Raises:
         SceneError: no such scene, or it cannot be rendered here; with the file and the line.
-        InputError: `define` or `sensor` for a scene that is no XML file.
+        InputError: `define` or `sensor` for a scene that is no such file.
 
     Example:
         >>> import onespp
@@ -43,21 +44,33 @@ def load(scene: str | Path | Scene, *, define: Mapping[str, object] | None = Non
         return scene
     if not isinstance(scene, str | Path):
         raise SceneError(f"a scene is a {type(scene).__name__}: use a name of onespp.scenes(), the "
-                         "path of a .py or .xml file, or a onespp.Scene")
-    if not str(scene).lower().endswith(_XML):
-        if define or sensor:
-            option = "-D" if define else "--sensor"
-            raise InputError(f"{option} is for Mitsuba's XML files, and '{scene}' is none: leave "
-                             "it out")
+                         "path of a .py, .xml, .glb or .gltf file, or a onespp.Scene")
+    kind = str(scene).lower()
+    if define and not kind.endswith(_XML):
+        raise InputError(f"-D is for Mitsuba's XML files, and '{scene}' is none: leave it out")
+    if not kind.endswith((_XML, *_GLTF)):
+        if sensor:
+            raise InputError(f"--sensor is for files of Mitsuba and of glTF, and '{scene}' is "
+                             "none: leave it out")
         return catalog.load(str(scene))
     with turn():
-        from onespp.render.scene_files.mitsuba_xml import load_xml  # imports Mitsuba
-
-        values = {str(name): _text(value) for name, value in (define or {}).items()}
-        loaded = load_xml(Path(scene), values, sensor)
+        loaded = _of_file(Path(scene), kind, define or {}, sensor)
+    if loaded.added:
+        caller().inform(loaded.added)
     if loaded.unused:
         caller().inform(f"of {Path(scene).name} is not used: {loaded.unused}")
     return loaded.scene
+
+
+def _of_file(path: Path, kind: str, define: Mapping[str, object], sensor: int) -> Loaded:
+    """The scene of another program's file; imports Mitsuba."""
+    if kind.endswith(_XML):
+        from onespp.render.scene_files.mitsuba_xml import load_xml
+
+        return load_xml(path, {str(name): _text(value) for name, value in define.items()}, sensor)
+    from onespp.render.gltf.gltf import load_gltf
+
+    return load_gltf(path, sensor)
 
 
 @public

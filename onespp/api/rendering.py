@@ -44,7 +44,7 @@ def render(scene: str | Path | Scene, out: Path | str | None = None, *,
 
     Args:
         scene: as for `load`: a name of `onespp.scenes()`, the path of a `.py` file or of a Mitsuba
-            3 `.xml` file, or a `Scene`.
+            3 `.xml` or a glTF file, or a `Scene`.
         out: folder of the sequence. None: a temporary one that is removed when Python ends, so
             that a cell can be run again with other sizes; give a folder to keep the frames.
         frames: how many, from frame 0 on, or their numbers, increasing; default all.

@@ -35,7 +35,7 @@ scene_options = (
                  help="Value of a parameter, $NAME, of a Mitsuba XML file; may be given several "
                       "times."),
     click.option("--sensor", type=int, default=0, show_default=True, metavar="N",
-                 help="Which camera of a Mitsuba XML file, from 0."),
+                 help="Which camera of a Mitsuba or glTF file, from 0."),
     click.option("--camera", metavar="MOVE",
                  help="Set a still camera in motion, as far as there is room: orbit, dolly or "
                       "handheld; or make it still."),

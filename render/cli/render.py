@@ -26,7 +26,7 @@ from .terminal import progress
               "is there.")
 @render_options
 def render(scene: str, out: Path | None, device: str, threads: int | None, **options) -> None:
-    """Render SCENE (a name, a Python file, or a Mitsuba XML file) at one sample a pixel.
+    """Render SCENE (a name, or a file of Python, Mitsuba or glTF) at one sample a pixel.
 
     Running the same command again renders what is missing.
     """

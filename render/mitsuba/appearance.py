@@ -30,7 +30,8 @@ the density).
 Of the diffuse reflectance Mitsuba knows only for some plugins what it is (`_TOLD`). Asked of any
 other, it takes what comes back along the normal, highlight included: 1 for a polarizing plastic, 12
 for a blend with metal. Here a blend has the mean of its parts, by weight, of which those that are
-not diffuse add nothing, and other plugins answer with their diffuse lobes alone.
+not diffuse add nothing, and other plugins answer with their diffuse lobes alone. Of Disney's it
+takes the base colour, which is that of metal and glass too: here only what is neither is diffuse.
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ _MICROFACETS = ("RoughConductor", "RoughDielectric", "RoughPlastic", "PolarizedP
 _DISNEY = ("Principled", "PrincipledThin")
 _MAPS = ("NormalMap", "BumpMap")
 _TOLD = ("SmoothDiffuse", "SmoothPlastic", "RoughPlastic", *_DISNEY)
+_NOT_DIFFUSE = ("metallic", "spec_trans")  # shares of Disney's
 _LEAST_DISNEY = 1e-3
 _NO_LENGTH = 1e-8  # squared; a texel (0.5, 0.5, 0.5) but for the rounding of its interpolation
 _MIRROR = +mi.BSDFFlags.DeltaReflection | +mi.BSDFFlags.DeltaTransmission
@@ -146,7 +148,10 @@ def _diffuse(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f,
     if not bsdf.flags() & +mi.BSDFFlags.DiffuseReflection:
         return mi.Color3f(0), mi.Float(0)
     if kind in _TOLD:
-        return mi.Color3f(bsdf.eval_diffuse_reflectance(si, active)), mi.Float(1)
+        share = mi.Float(1)
+        for name in _NOT_DIFFUSE:
+            share *= 1 - (parts[name].eval_1(si, active) if name in parts else 0)
+        return mi.Color3f(bsdf.eval_diffuse_reflectance(si, active)) * share, share
     if "diffuse_reflectance" in parts:
         return mi.Color3f(parts["diffuse_reflectance"].eval(si, active)), mi.Float(1)
     along = mi.Vector3f(0, 0, 1)
@@ -159,12 +164,14 @@ def _diffuse(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f,
 
 def _is_told(bsdf: mi.BSDF) -> bool:
     """Whether Mitsuba knows the diffuse reflectance of a material, or it has none."""
-    kind = bsdf.class_name()
+    kind, parts = bsdf.class_name(), _objects(bsdf)
     if kind == "TwoSidedBRDF":  # one value for both sides, unless one is not diffuse
         lobes = {bool(side.flags() & +mi.BSDFFlags.DiffuseReflection) for side in _nested(bsdf)}
         return len(lobes) == 1 and all(map(_is_told, _nested(bsdf)))
     if kind in ("MaskBSDF", *_MAPS):
         return all(map(_is_told, _nested(bsdf)))
+    if kind in _DISNEY and any(name in parts and parts[name].max() > 0 for name in _NOT_DIFFUSE):
+        return False
     return kind in _TOLD or not bsdf.flags() & +mi.BSDFFlags.DiffuseReflection
 
 

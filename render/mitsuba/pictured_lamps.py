@@ -29,4 +29,5 @@ def is_found(mesh: mi.Mesh, geometry: Mesh) -> bool:
     face = np.repeat(np.arange(len(corners)), _POINTS)
     area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
     told = np.repeat(area > 0, _POINTS)  # a face without an area in the picture gives no light
-    return bool((np.array(found.prim_index)[told] == face[told]).mean() > 0.99)  # edges
+    right = np.array(found.prim_index)[told] == face[told]
+    return bool(right.size and right.mean() > 0.99)  # edges

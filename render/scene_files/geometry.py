@@ -123,12 +123,12 @@ def _read(plugin: str, options: dict[str, Any], flipped: bool) -> Mesh:
     if uv is not None:
         uv = np.where(np.isfinite(uv), uv, 0)
     if normals is not None:
-        normals = _with_lengths(normals, vertices, faces)
+        normals = with_lengths(normals, vertices, faces)
         normals = -normals if flipped else normals
     return Mesh(vertices, faces[:, ::-1] if flipped else faces, normals, uv)
 
 
-def _with_lengths(normals: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+def with_lengths(normals: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Normals; where one has no length, or is none, that of the faces around."""
     bad = ~(np.isfinite(normals).all(axis=1) & np.any(normals, axis=1))
     if not bad.any():

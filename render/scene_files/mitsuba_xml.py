@@ -8,8 +8,7 @@ What cannot be rendered here is refused where it stands.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +18,9 @@ from onespp.scenes.description import LONGEST_PATH, Camera, Scene, SceneError, S
 from . import lights
 from .document import Node, read_document
 from .geometry import Geometries, Piece, default_name
+from .loaded import FRAMES, Loaded, scene_name, unique_names
 from .surfaces import Surfaces
 
-FRAMES = 24  # as many as nothing says otherwise
 # Of shapes without a material, as in Mitsuba: of lamps, and of others.
 _BLACK = {"type": "diffuse", "reflectance": (0.0, 0.0, 0.0)}
 _GRAY = {"type": "diffuse", "reflectance": (0.5, 0.5, 0.5)}
@@ -33,14 +32,6 @@ _SENSOR = ("to_world", "fov", "fov_axis", "focal_length", "near_clip", "far_clip
            "aperture_radius", "focus_distance", "srf")
 # Mitsuba's camera has x to the left and y up.
 _SENSOR_FROM_CAMERA = np.diag([-1.0, -1, 1, 1])
-
-
-@dataclass(frozen=True)
-class Loaded:
-    """A scene from a file. unused: what of the file is not used, in words; "" if nothing."""
-
-    scene: Scene
-    unused: str
 
 
 def load_xml(path: Path, parameters: Mapping[str, str] | None = None, sensor: int = 0) -> Loaded:
@@ -63,7 +54,7 @@ def load_xml(path: Path, parameters: Mapping[str, str] | None = None, sensor: in
     emitters = root.parts("emitter")
     try:
         scene = Scene(
-            name=_name(path), about=f"A still scene of {path.name}",
+            name=scene_name(path), about=f"A still scene of {path.name}",
             shapes=_shapes(root, surfaces, path), camera=camera, frames=FRAMES, width=width,
             height=height, max_depth=_depth(integrator),
             environment=lights.around(emitters, surfaces),
@@ -73,11 +64,6 @@ def load_xml(path: Path, parameters: Mapping[str, str] | None = None, sensor: in
         raise SceneError(text if text.startswith("scene file") else
                          f"scene file '{path}': {text}") from None
     return Loaded(scene, ", ".join(_unused(root, camera_node, integrator)))
-
-
-def _name(path: Path) -> str:
-    name = "".join(letter if letter.isprintable() else "_" for letter in path.stem)[:100]
-    return name if name.strip(". ") else "scene"
 
 
 def _sensor(root: Node, path: Path, number: int) -> Node:
@@ -175,7 +161,7 @@ def _shapes(root: Node, surfaces: Surfaces, path: Path) -> tuple[Shape, ...]:
     if not pieces:
         raise SceneError(f"scene file '{path}': there are no shapes: add one")
     return tuple(_shape(name, piece, surfaces)
-                 for name, (_, piece) in zip(_unique(name for name, _ in pieces), pieces))
+                 for name, (_, piece) in zip(unique_names(name for name, _ in pieces), pieces))
 
 
 def _shape(name: str, piece: Piece, surfaces: Surfaces) -> Shape:
@@ -191,21 +177,6 @@ def _shape(name: str, piece: Piece, surfaces: Surfaces) -> Shape:
     except SceneError as error:
         text = str(error)
         raise (error if text.startswith("scene file") else node.error(text)) from None
-
-
-def _unique(names: Iterable[str]) -> list[str]:
-    """Names of which those that come again have a number behind them."""
-    made: list[str] = []
-    taken: dict[str, int] = {}
-    for name in names:
-        name = "".join(letter if letter.isprintable() else "_" for letter in name)[:180]
-        chosen = name
-        while chosen in taken:
-            taken[name] += 1
-            chosen = f"{name} {taken[name]}"
-        taken[chosen] = 1
-        made.append(chosen)
-    return made
 
 
 def _unused(root: Node, camera: Node, integrator: Node | None) -> list[str]:

@@ -37,12 +37,14 @@ from onespp.render.files import exr
 from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.files.times import read_times
 from onespp.render.games202.convert import export_games202, import_games202, read_mat
+from onespp.render.gltf.gltf import load_gltf
 from onespp.render.references import References
 from onespp.render.tracer.reference import SampleSums
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 from onespp.scenes.description import SceneError
 from tests.cli.test_command import SCENE
+from tests.support.gltf_scenes import lit, moving
 from tests.support.report_sequence import make_report_sequence
 from tests.support.small_sequence import small_sequence
 
@@ -174,6 +176,8 @@ READERS = {
     "run": Reader(_run, _read_run, "json"),
     "scores": Reader(_scored, _read_scores, "json"),
     "times": Reader(_times, _read_times, "json"),
+    "gltf": Reader(lambda f: lit(f)[0], lambda p: load_gltf(p), "json"),
+    "glb": Reader(lambda f: moving(f)[0], lambda p: load_gltf(p)),
     "scene": Reader(_scene, lambda p: catalog.load(str(p)), "text"),
 }
 

@@ -18,10 +18,9 @@ from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.animation import spin
 from onespp.scenes.description import LONGEST_PATH, SceneError
 from onespp.scenes.fingerprint import fingerprint
+from tests.support import brightness
 from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
 from tests.support.xml_scenes import SCENES, write_png, write_quad
-
-PARTS = 4
 
 
 def scene_xml(inside: str, sensor: str = '<float name="fov" value="50"/>', depth: int = 3,
@@ -49,24 +48,14 @@ def written(tmp_path: Path, text: str) -> Path:
 
 
 def means(path: Path, spp: int) -> tuple[np.ndarray, np.ndarray]:
-    """(PARTS, 3) mean colours of independent renders, by Mitsuba and by us."""
+    """Mean colours of a file's renders, by Mitsuba and by us."""
     scene = mi.load_file(str(path), **({"filter": "box"} if "$filter" in path.read_text() else {}))
-    theirs = np.stack([np.array(mi.render(scene, spp=spp, seed=i))[..., :3].mean((0, 1))
-                       for i in range(PARTS)])
-    description = load_xml(path).scene
-    renderer = Renderer(description, description.height, description.width)
-    ours = np.stack([renderer.sample_sum(0, 1, part, spp, antialias=True).mean((0, 1)) / spp
-                     for part in range(PARTS)])
-    return theirs, ours
+    return brightness.means(scene, load_xml(path).scene, spp)
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_a_scene_is_as_bright_as_mitsubas(name: str, tmp_path: Path):
-    theirs, ours = means(SCENES[name](tmp_path), spp=64)
-    error = np.sqrt((theirs.var(0, ddof=1) + ours.var(0, ddof=1)) / PARTS)
-    off = abs(ours.mean(0) - theirs.mean(0))
-    assert (off < np.maximum(0.01 * theirs.mean(0), 3 * error)).all()
-    assert (error < 0.01 * theirs.mean(0)).all()  # else the line above says little
+    brightness.assert_as_bright(*means(SCENES[name](tmp_path), spp=64))
 
 
 @pytest.mark.parametrize("name", [

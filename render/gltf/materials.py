@@ -1,0 +1,174 @@
+"""Metallic-roughness materials as dictionaries of Mitsuba's.
+
+    opaque, or solid glass (`KHR_materials_volume`)   principled, two-sided unless light gets in
+    thin glass (transmission without a volume)        principledthin; of a metal the opaque one
+    alphaMode MASK, BLEND                             mask: 0 or 1 by the cutoff, or alpha itself
+
+Both models shade by GGX of alpha = roughness^2 with an F0 of 0.04 (or by `KHR_materials_ior`) and
+tint metals by the base colour; the diffuse lobe is Disney's, not Lambert's. Both sides of every
+surface are shaded: nothing is culled. Emission is radiance as it is: factor times texture times
+`KHR_materials_emissive_strength`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from onespp.scenes.validity import brief
+
+from .document import Document
+from .item import Item
+from .textures import Texture, Textures
+
+_IOR = 1.5
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a surface looks like.
+
+    Attributes:
+        material: None where it is not there at all (alpha below its cutoff).
+        emission: None, (r, g, b), or a texture's dictionary. uv_set: that its textures need, None
+            where it has no textures.
+    """
+
+    material: dict[str, Any] | None
+    emission: Any
+    uv_set: int | None
+
+
+class Materials:
+    """Materials, made once each: primitives that refer to one share it."""
+
+    def __init__(self, document: Document) -> None:
+        self._document, self._textures = document, Textures(document)
+        self._made: dict[str, Look] = {}
+
+    def look(self, primitive: Item) -> Look:
+        """What a primitive looks like."""
+        item = (self._document.refer(primitive, "material", "materials")
+                if "material" in primitive else Item({}, "", primitive.file))
+        if item.path not in self._made:
+            self._made[item.path] = self._look(item)
+        return self._made[item.path]
+
+    def _look(self, item: Item) -> Look:
+        pbr = item.part("pbrMetallicRoughness")
+        base = self._textures.texture(pbr, "baseColorTexture", color=True)
+        rough = self._textures.texture(pbr, "metallicRoughnessTexture")
+        bumps = self._textures.texture(item, "normalTexture")
+        shining = self._textures.texture(item, "emissiveTexture", color=True)
+        through = item.extension("KHR_materials_transmission")
+        clear = self._textures.texture(through, "transmissionTexture")
+        if "occlusionTexture" in item:
+            self._document.leave(item, "occlusion textures")
+        factor = pbr.numbers("baseColorFactor", (1, 1, 1, 1), 0, 1)
+        surface = {
+            "base_color": _values(base, slice(0, 3), factor[:3]),
+            "roughness": _values(rough, slice(1, 2), pbr.number("roughnessFactor", 1, 0, 1)),
+            "metallic": _values(rough, slice(2, 3), pbr.number("metallicFactor", 1, 0, 1)),
+            "spec_trans": _values(clear, slice(0, 1), through.number("transmissionFactor", 0, 0,
+                                                                     1))}
+        # Of glTF an index of 0 means a perfect mirror, and 1 none at all.
+        ior = item.extension("KHR_materials_ior").number("ior", _IOR, 0, 10)
+        surface["eta"] = min(max(ior, 1.001), 10.0) if ior else 10.0
+        volume = item.extension("KHR_materials_volume")
+        if "attenuationColor" in volume:
+            self._document.leave(volume, "what a volume absorbs")
+        solid = volume.number("thicknessFactor", 0, 0) > 0
+        material = _covered(item, base, float(factor[3]), _material(
+            surface, solid, _normal_map(item, bumps)))
+        return Look(material, self._emission(item, shining), self._uv_set(
+            item, base, rough, bumps, shining, clear))
+
+    def _emission(self, item: Item, shining: Texture | None) -> Any:
+        factor = item.numbers("emissiveFactor", (0, 0, 0), 0)
+        factor = factor * item.extension("KHR_materials_emissive_strength").number(
+            "emissiveStrength", 1, 0, 1e9)
+        found = _values(shining, slice(0, 3), factor)
+        if isinstance(found, dict):
+            return found if found["bitmap"].any() else None
+        return found if any(found) else None
+
+    def _uv_set(self, item: Item, *textures: Texture | None) -> int | None:
+        sets = {texture.uv_set for texture in textures if texture is not None}
+        if len(sets) > 1:
+            raise item.error(f"its textures use the coordinates {sorted(sets)}: use one set of "
+                             "them in a material")
+        return min(sets, default=None)
+
+
+def _values(texture: Texture | None, channels: slice, factor: Any) -> Any:
+    """A factor, or the texture's channels times it."""
+    scalar = np.ndim(factor) == 0
+    if texture is None:
+        return float(factor) if scalar else tuple(map(float, factor))
+    if not np.any(factor):
+        return 0.0 if scalar else (0.0,) * len(factor)
+    values = texture.pixels[..., channels] * np.asarray(factor, np.float32)
+    if (values == values[0, 0]).all():
+        one: Sequence[float] = values[0, 0].astype(float).tolist()
+        return one[0] if scalar else tuple(one)
+    return texture.dictionary(values)
+
+
+def _material(surface: dict[str, Any], solid: bool,
+              normal_map: dict[str, Any] | None) -> dict[str, Any]:
+    """A surface without its holes."""
+    def shaded(made: dict[str, Any]) -> dict[str, Any]:
+        return made if normal_map is None else {
+            "type": "normalmap", "normalmap": normal_map, "bsdf": made}
+
+    metallic, clear = surface["metallic"], surface["spec_trans"]
+    if clear == 0 or metallic == 1:
+        opaque = {"type": "principled", **surface}
+        del opaque["spec_trans"]
+        return {"type": "twosided", "bsdf": shaded(opaque)}
+    if solid:
+        return shaded({"type": "principled", **surface})
+    thin = {"type": "principledthin", **surface}
+    del thin["metallic"]
+    thin["diff_trans"] = 0.0
+    if metallic == 0:
+        return shaded(thin)
+    metal = {"type": "principled", **surface, "metallic": 1.0}
+    del metal["spec_trans"]
+    return {"type": "blendbsdf", "weight": metallic, "bsdf_0": shaded(thin),
+            "bsdf_1": {"type": "twosided", "bsdf": shaded(metal)}}
+
+
+def _covered(item: Item, base: Texture | None, factor: float,
+             material: dict[str, Any]) -> dict[str, Any] | None:
+    """A material with the holes that its alpha makes; None where there is nothing but holes."""
+    mode = item.text("alphaMode", "OPAQUE")
+    if mode not in ("OPAQUE", "MASK", "BLEND"):
+        raise item.error(f"its alphaMode is {brief(mode)}: there are OPAQUE, MASK and BLEND")
+    if mode == "OPAQUE":
+        return material
+    opacity = _values(base, slice(3, 4), factor)
+    if mode == "MASK":
+        cutoff = item.number("alphaCutoff", 0.5, 0)
+        if isinstance(opacity, dict):
+            # Between two texels there is no half a hole.
+            opacity |= {"bitmap": (opacity["bitmap"] >= cutoff).astype(np.float32),
+                        "filter_type": "nearest"}
+        else:
+            opacity = float(opacity >= cutoff)
+    if opacity == 0:
+        return None
+    return material if opacity == 1 else {"type": "mask", "opacity": opacity, "bsdf": material}
+
+
+def _normal_map(item: Item, bumps: Texture | None) -> dict[str, Any] | None:
+    if bumps is None:
+        return None
+    scale = item.part("normalTexture").number("scale", 1)
+    n = (2 * bumps.pixels[..., :3].astype(np.float64) - 1) * (scale, scale, 1)
+    lengths = np.linalg.norm(n, axis=2, keepdims=True)
+    n = np.where(lengths > 0, n / np.where(lengths > 0, lengths, 1), (0, 0, 1))
+    return bumps.dictionary((n / 2 + 0.5).astype(np.float32))
