@@ -159,7 +159,141 @@ def foliage(folder: Path) -> Path:
     return path
 
 
-SCENES = {"indoor": indoor, "glass": glass, "foliage": foliage}
+def many(folder: Path) -> Path:
+    """774 shapes of a few meshes and materials, long paths, one lamp: as a staircase or a city."""
+    write_obj(folder / "block.obj", meshes.box((0.16, 0.16, 0.16)))
+    write_obj(folder / "cup.obj", meshes.lathe([(0.0, 0), (0.08, 0), (0.05, 0.2)], 8))
+    rng = np.random.default_rng(5)
+    kinds = ("clay", "plastic", "brass")
+    shapes = []
+    for i in range(771):
+        row, column = divmod(i, 31)
+        x, z, turn = 0.25 * (column - 15), 0.25 * (row - 18), rng.uniform(0, 90)
+        shapes.append(
+            f'<shape type="obj" id="thing {i}"><string name="filename" '
+            f'value="{"cup" if i % 3 else "block"}.obj"/><transform name="to_world">'
+            f'<rotate y="1" angle="{turn:.1f}"/><scale y="{rng.uniform(0.5, 3):.2f}"/>'
+            f'<translate x="{x:.2f}" y="0.1" z="{z:.2f}"/></transform>'
+            f'<ref id="{kinds[i % len(kinds)]}"/></shape>')
+    path = folder / "many.xml"
+    path.write_text(HEAD.format(depth=65, origin="0, 2.2, 4", target="0, 0, 0",
+                                fov='<float name="fov" value="50"/>') + """
+  <bsdf type="twosided" id="clay"><bsdf type="diffuse">
+    <rgb name="reflectance" value="0.7, 0.5, 0.4"/></bsdf></bsdf>
+  <bsdf type="twosided" id="plastic"><bsdf type="roughplastic"><float name="alpha" value="0.2"/>
+    <rgb name="diffuse_reflectance" value="0.2, 0.3, 0.6"/></bsdf></bsdf>
+  <bsdf type="twosided" id="brass"><bsdf type="roughconductor"><float name="alpha" value="0.3"/>
+    <rgb name="specular_reflectance" value="0.9, 0.7, 0.4"/></bsdf></bsdf>
+""" + "\n".join(shapes) + """
+  <shape type="rectangle" id="ground"><transform name="to_world"><scale value="6"/>
+      <rotate x="1" angle="-90"/></transform><ref id="clay"/></shape>
+  <shape type="rectangle" id="ceiling"><transform name="to_world"><scale value="6"/>
+      <rotate x="1" angle="90"/><translate y="4.2"/></transform><ref id="clay"/></shape>
+  <shape type="rectangle" id="lamp"><transform name="to_world"><scale x="2" y="1.5"/>
+      <rotate x="1" angle="90"/><translate y="4"/></transform>
+    <emitter type="area"><rgb name="radiance" value="9, 8, 7"/></emitter></shape>
+</scene>
+""")
+    return path
+
+
+def lights(folder: Path) -> Path:
+    """Lights of all kinds, more than eight, with instances and stretched and mirrored spheres."""
+    path = folder / "lights.xml"
+    lamps = "".join(
+        f'<shape type="sphere" id="bulb {i}"><point name="center" x="{-1.5 + i}" y="2.2" '
+        f'z="{0.4 * (i % 2) - 1}"/><float name="radius" value="0.1"/><emitter type="area">'
+        f'<rgb name="radiance" value="{6 + i}, 7, {9 - i}"/></emitter></shape>' for i in range(4))
+    path.write_text(HEAD.format(depth=6, origin="0.5, 1.6, 4", target="0, 0.6, 0",
+                                fov='<float name="fov" value="50"/>') + lamps + """
+  <shape type="shapegroup" id="pair">
+    <shape type="sphere"><float name="radius" value="0.3"/>
+      <bsdf type="plastic"><rgb name="diffuse_reflectance" value="0.6, 0.2, 0.2"/></bsdf></shape>
+    <shape type="cube"><transform name="to_world"><scale value="0.2"/><translate y="0.5"/>
+      </transform><bsdf type="diffuse"/></shape>
+  </shape>
+  <shape type="instance" id="near"><ref id="pair"/><transform name="to_world">
+      <translate x="-0.9" y="0.3" z="0.5"/></transform></shape>
+  <shape type="instance" id="far"><ref id="pair"/><transform name="to_world">
+      <scale value="1.3"/><rotate y="1" angle="30"/><translate x="0.9" y="0.4" z="-0.6"/>
+      </transform></shape>
+  <shape type="sphere" id="mirrored"><float name="radius" value="0.4"/>
+    <transform name="to_world"><scale x="-1"/><rotate z="1" angle="20"/>
+      <translate x="0.1" y="0.4" z="0.2"/></transform>
+    <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.3, 0.6, 0.3"/>
+      </bsdf></bsdf></shape>
+  <shape type="rectangle" id="ground"><transform name="to_world"><scale value="4"/>
+      <rotate x="1" angle="-90"/></transform>
+    <bsdf type="twosided"><bsdf type="diffuse"/></bsdf></shape>
+  <shape type="disk" id="panel"><transform name="to_world"><scale value="0.4"/>
+      <rotate y="1" angle="70"/><translate x="-2" y="1" z="0"/></transform>
+    <emitter type="area"><rgb name="radiance" value="5, 5, 8"/></emitter></shape>
+  <emitter type="point"><point name="position" value="1.5, 1.8, 1"/>
+    <rgb name="intensity" value="1.5, 1.2, 1"/></emitter>
+  <emitter type="point"><point name="position" value="-1.2, 2, -1"/>
+    <rgb name="intensity" value="0.5, 1, 1.5"/></emitter>
+  <emitter type="spot"><rgb name="intensity" value="8, 8, 5"/>
+    <float name="cutoff_angle" value="25"/><transform name="to_world">
+      <lookat origin="0, 3, 2" target="0, 0, 0" up="1, 0, 0"/></transform></emitter>
+  <emitter type="directional"><vector name="direction" value="-1, -2, -0.5"/>
+    <rgb name="irradiance" value="0.5, 0.5, 0.6"/></emitter>
+  <emitter type="constant"><rgb name="radiance" value="0.1, 0.1, 0.15"/></emitter>
+</scene>
+""")
+    return path
+
+
+def metals(folder: Path) -> Path:
+    """Conductors, maps of bumps and normals, blends, two sides that differ, under a turned sky."""
+    from onespp.render.mitsuba.variant import mi
+    sky = np.ones((8, 16, 3), np.float32) * (0.5, 0.6, 0.8)
+    sky[:4, 3:6] = 3, 2.5, 2
+    mi.Bitmap(sky.astype(np.float32)).write(str(folder / "sky.exr"))
+    write_png(folder / "bumps.png", _stripes((0.1, 0.1, 0.1), (0.9, 0.9, 0.9)))
+    write_png(folder / "normals.png", _stripes((0.4, 0.5, 0.97), (0.6, 0.45, 0.98)))
+    write_obj(folder / "vase.obj", meshes.lathe([(0.0, 0), (0.4, 0), (0.2, 0.6), (0.4, 1)], 12))
+    path = folder / "metals.xml"
+    path.write_text(HEAD.format(depth=10, origin="0, 1.3, 4", target="0, 0.5, 0",
+                                fov='<float name="fov" value="45"/>') + """
+  <bsdf type="twosided" id="copper"><bsdf type="bumpmap">
+    <texture type="bitmap"><string name="filename" value="bumps.png"/>
+      <boolean name="raw" value="true"/></texture><float name="scale" value="0.03"/>
+    <bsdf type="roughconductor"><string name="material" value="Cu"/>
+      <float name="alpha" value="0.3"/></bsdf></bsdf></bsdf>
+  <bsdf type="twosided" id="tile"><bsdf type="normalmap">
+    <texture name="normalmap" type="bitmap"><string name="filename" value="normals.png"/>
+      <boolean name="raw" value="true"/>
+      <transform name="to_uv"><scale x="4" y="4"/></transform></texture>
+    <bsdf type="roughplastic"><float name="alpha" value="0.25"/>
+      <rgb name="diffuse_reflectance" value="0.5, 0.4, 0.3"/></bsdf></bsdf></bsdf>
+  <bsdf type="twosided" id="worn"><bsdf type="blendbsdf">
+    <texture name="weight" type="bitmap"><string name="filename" value="bumps.png"/>
+      <boolean name="raw" value="true"/></texture>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0.6, 0.1, 0.1"/></bsdf>
+    <bsdf type="roughconductor"><float name="alpha" value="0.2"/></bsdf></bsdf></bsdf>
+  <bsdf type="twosided" id="card">
+    <bsdf type="diffuse"><rgb name="reflectance" value="0.1, 0.3, 0.7"/></bsdf>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0.7, 0.6, 0.1"/></bsdf></bsdf>
+  <shape type="obj" id="vase"><string name="filename" value="vase.obj"/><transform name="to_world">
+      <translate x="-1" z="0.2"/></transform><ref id="copper"/></shape>
+  <shape type="sphere" id="ball"><point name="center" x="0.2" y="0.5" z="0.4"/>
+    <float name="radius" value="0.5"/><ref id="worn"/></shape>
+  <shape type="sphere" id="chrome"><point name="center" x="1.2" y="0.4" z="-0.3"/>
+    <float name="radius" value="0.4"/><bsdf type="conductor"/></shape>
+  <shape type="rectangle" id="sheet"><transform name="to_world"><scale value="0.5"/>
+      <rotate y="1" angle="150"/><translate x="0.1" y="1.1" z="-0.8"/></transform>
+    <ref id="card"/></shape>
+  <shape type="rectangle" id="ground"><transform name="to_world"><scale value="5"/>
+      <rotate x="1" angle="-90"/></transform><ref id="tile"/></shape>
+  <emitter type="envmap"><string name="filename" value="sky.exr"/>
+    <transform name="to_world"><rotate y="1" angle="200"/></transform></emitter>
+</scene>
+""")
+    return path
+
+
+SCENES = {"indoor": indoor, "glass": glass, "foliage": foliage, "many": many, "lights": lights,
+          "metals": metals}
 
 
 def _room() -> Mesh:

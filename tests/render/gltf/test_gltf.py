@@ -73,7 +73,8 @@ def test_keys_are_met_and_what_does_not_change_stands_still(tmp_path):
 
 def test_a_file_without_camera_and_light_is_seen_and_lit(tmp_path):
     w = Writer()
-    w.placed(np.diag((2.0, 2, 2, 1)), mesh=w.mesh(w.array(QUAD), mode=6), name="a\nquad")
+    w.placed(np.diag((2.0, 2, 2, 1)), name="a\nquad", mesh=w.mesh(w.array(QUAD), w.put(
+        "materials", {"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1]}}), mode=6))
     w.json["cameras"] = []
     w.json["extensionsUsed"] = ["KHR_materials_sheen"]
     w.json["animations"] = [{"channels": [{"sampler": 0, "target": {"path": "pointer"}}],
@@ -152,11 +153,12 @@ def test_what_cannot_be_rendered_is_told_with_its_place(place: str, value: Any, 
 def test_the_library_reads_files_and_refuses_what_is_for_others(tmp_path):
     path = lit(tmp_path)[0]
     assert onespp.load(path).object_names == ("box", "box 2", "floor")
-    for wrong, options, sentence in (
+    cases: tuple[tuple[Any, dict[str, Any], str], ...] = (
             (path, {"sensor": 1}, "there is no sensor 1: use --sensor 0 to 0"),
-            (path, {"define": {"a": 1}}, "-D is for Mitsuba's XML files"),
+            (path, {"define": {"a": 1}}, "is for Mitsuba's XML files"),
             (tmp_path / "no.glb", {}, "there is no scene file '.*no.glb': there is no such file"),
-            ("box", {"sensor": 1}, "--sensor is for files of Mitsuba and of glTF, and 'box'")):
+            ("box", {"sensor": 1}, "sensor is for files of Mitsuba and of glTF, and 'box'"))
+    for wrong, options, sentence in cases:
         with pytest.raises((InputError, SceneError), match=sentence) as caught:
             onespp.load(wrong, **options)
         assert str(caught.value).isprintable()

@@ -53,7 +53,9 @@ def means(path: Path, spp: int) -> tuple[np.ndarray, np.ndarray]:
     return brightness.means(scene, load_xml(path).scene, spp)
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", [
+    *("indoor", "glass", "foliage", "lights"),
+    *(pytest.param(name, marks=pytest.mark.slow) for name in ("many", "metals"))])
 def test_a_scene_is_as_bright_as_mitsubas(name: str, tmp_path: Path):
     brightness.assert_as_bright(*means(SCENES[name](tmp_path), spp=64))
 
