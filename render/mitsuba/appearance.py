@@ -170,7 +170,8 @@ def _is_told(bsdf: mi.BSDF) -> bool:
         return len(lobes) == 1 and all(map(_is_told, _nested(bsdf)))
     if kind in ("MaskBSDF", *_MAPS):
         return all(map(_is_told, _nested(bsdf)))
-    if kind in _DISNEY and any(name in parts and parts[name].max() > 0 for name in _NOT_DIFFUSE):
+    if kind in _DISNEY and any(parts[name].is_spatially_varying() or parts[name].max() > 0
+                               for name in _NOT_DIFFUSE if name in parts):
         return False
     return kind in _TOLD or not bsdf.flags() & +mi.BSDFFlags.DiffuseReflection
 
