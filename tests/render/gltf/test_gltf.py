@@ -38,6 +38,7 @@ def test_surfaces_are_where_mitsubas_are_and_face_as_they_do(made):
     name, (path, frame, theirs) = made
     stage = MitsubaScene(load_gltf(path).scene)
     stage.set_frame(frame)
+    assert stage.appearance  # metal from a texture too: it is asked of every material
     grid = np.stack(np.meshgrid(np.linspace(-0.6, 0.6, 13), np.linspace(-0.4, 0.3, 8)), -1)
     rays = np.concatenate([grid.reshape(-1, 2), -np.ones((104, 1))], 1) @ EYE[:3, :3].T
 
