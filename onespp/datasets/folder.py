@@ -22,6 +22,7 @@ from onespp.render.files.lock import when_free, writing
 from onespp.render.files.manifest import Manifest
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.progress import Progress, silent
+from onespp.scenes.drawn.draw import DRAWING
 
 from .card import card
 from .plan import SPLITS, Plan, SplitName
@@ -75,9 +76,11 @@ class Entry(JsonFile):
 class DataSetFile(JsonFile):
     """dataset.json: the plan, who rendered, and the sequences that were whole when it was written.
 
+    `drawing` is `scenes.drawn.draw.DRAWING` of the onespp that draws its scenes.
     """
 
     format: Annotated[int, Field(ge=FORMAT, le=FORMAT)] = FORMAT
+    drawing: int = 1
     plan: Plan
     versions: dict[str, str]
     sequences: dict[int, Entry] = Field(default_factory=dict)
@@ -143,6 +146,9 @@ class DataSet:
                 if there.plan.key != plan.key:
                     raise InputError(f"{folder} holds a data set of another plan "
                                      f"({_difference(there.plan, plan)}): use another --out")
+                if there.drawing != DRAWING:
+                    raise InputError(f"{folder} has scenes that another version of onespp drew, "
+                                     "and this one draws others: use another --out")
                 if there.plan.sequences >= plan.sequences:
                     return cls(folder, there.plan)
                 written = there.model_copy(update={"plan": plan})
@@ -150,7 +156,7 @@ class DataSet:
                 if folder.exists() and any(not p.name.startswith(".") for p in folder.iterdir()):
                     raise InputError(f"{folder} holds files that are no data set: use another "
                                      "--out")
-                written = DataSetFile(plan=plan, versions=dict(versions))
+                written = DataSetFile(drawing=DRAWING, plan=plan, versions=dict(versions))
         except OSError as error:
             raise InputError(explain(folder, error)) from error
         with cls(folder, plan)._changing():

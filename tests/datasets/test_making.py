@@ -25,7 +25,7 @@ from onespp.render.files.json_file import read_json
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import FrameSequence
 from onespp.scenes.description import Camera
-from onespp.scenes.drawn.draw import Drawn, draw
+from onespp.scenes.drawn.draw import DRAWING, Drawn, draw
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -203,6 +203,16 @@ def test_parts_make_all_between_them():
     for part in ("0/3", "4/3", "1", "a/b"):
         with pytest.raises(InputError, match="use K/N"):
             part_of(range(7), part)
+
+
+def test_scenes_of_another_drawing_are_not_mixed_in(plan, tmp_path):
+    DataSet.create(tmp_path / "d", plan, {})
+    path = tmp_path / "d/dataset.json"
+    text = path.read_text()
+    assert f'"drawing": {DRAWING}' in text
+    path.write_text(text.replace(f'"drawing": {DRAWING}', '"drawing": 1'))
+    with pytest.raises(InputError, match="another version of onespp drew"):
+        DataSet.create(tmp_path / "d", plan, {})
 
 
 def test_a_folder_holds_one_data_set_which_may_grow(quick, plan, tmp_path):
