@@ -149,6 +149,7 @@ def test_where_memory_ran_out_a_process_of_its_own_makes_the_same_bytes(made, co
     assert files(copy.folder) == whole
 
 
+@pytest.mark.slow
 def test_a_process_that_the_system_kills_ends_nothing_else(monkeypatch, quick):
     """The process is this Python, told to kill itself in the middle of a call."""
     data, _ = quick
@@ -244,6 +245,7 @@ def test_the_command_says_what_was_made_and_what_was_not(quick, call, monkeypatc
         raise ValueError("no luck")
 
     monkeypatch.setattr(making, "make", fails)
+    monkeypatch.setattr(making, "make_alone", fails)
     code, out, err = call(*command)
     assert code == 2
     assert "sequence 0 failed twice (no luck)" in out
@@ -322,6 +324,7 @@ def small_disk(tmp_path):
     subprocess.run(["umount", str(place)], check=True)
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_leaves_whole_files_and_is_gone_on_with(made, small_disk):
     """A real one, full but for what a sequence and a half takes; then there is room again."""
     ballast = small_disk / "ballast"
