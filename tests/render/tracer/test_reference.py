@@ -244,11 +244,11 @@ def test_the_default_of_run_is_an_error_and_keeps_a_better_reference_too(tmp_pat
     before = files(out / "reference")
     code, _, err = call("run", *options, "--method", "bilateral")
     assert code == 0
-    assert "references to 1000 dB are likely to take 64 to 300 samples a pixel, so " in err
+    assert "references to 1000 dB are likely to take 16 to 300 samples a pixel, so " in err
     assert {p: t for p, t in files(out / "reference").items() if p in before} == before
     sequence = FrameSequence.open(out)
-    assert [sequence.reference_spp(i) for i in (0, 1)] == [300, 64]
-    assert json.loads((out / "scores.json").read_text())["reference_spp"] == 64
+    assert [sequence.reference_spp(i) for i in (0, 1)] == [300, 16]
+    assert json.loads((out / "scores.json").read_text())["reference_spp"] == 16
     code, _, err = call("run", *options, "--reference-spp", 16, "--reference-error", 1)
     assert (code, err.count("\n"), "use one of them" in err) == (2, 1, True)
 
