@@ -81,7 +81,7 @@ def train(folder: str, steps: int, crop: int = 64, batch: int = 4, workers: int 
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("folder", help="of a data set")
     parser.add_argument("--steps", type=int, default=200)
     parser.add_argument("--crop", type=int, default=64)
