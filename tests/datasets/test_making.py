@@ -132,6 +132,7 @@ def test_a_sequence_that_fails_is_tried_twice_and_does_not_stop_the_others(monke
     assert data.failed() == []
 
 
+@pytest.mark.slow
 def test_where_memory_ran_out_a_process_of_its_own_makes_the_same_bytes(made, copy, monkeypatch):
     whole = files(copy.folder)
     for path in (copy.place(1) / "sequence.json", *copy.place(1).glob("seed*/frames/0002.exr")):
