@@ -172,8 +172,8 @@ def render_sequence(job: RenderJob, folder: Path, *, overwrite: bool = False,
             references.grow_to_error(frames, job.reference_error, progress, tell)
         else:
             for done, index in enumerate(frames):
-                references.grow(index, spp, lambda part, whole, *_, done=done: progress(
-                    done + part / whole, count, what))
+                references.grow(index, spp, lambda some, whole, *_, done=done: progress(
+                    done + some / whole, count, what))
                 progress(done + 1, count, what)
         if part is None:
             sequence = sequence.with_reference_spp()

@@ -34,7 +34,7 @@ def test_a_scene_is_as_bright_as_mitsubas(made):
         mi.load_dict(theirs), load_gltf(path).scene, SPP[name], frame))
 
 
-def test_surfaces_are_where_mitsubas_are_and_face_as_they_do(made):
+def test_surfaces_are_where_mitsubas_are_and_scatter_as_they_do(made):
     name, (path, frame, theirs) = made
     stage = MitsubaScene(load_gltf(path).scene)
     stage.set_frame(frame)
@@ -45,9 +45,13 @@ def test_surfaces_are_where_mitsubas_are_and_face_as_they_do(made):
     def hits(scene, origin) -> tuple[np.ndarray, ...]:
         eye = mi.Point3f(*map(float, EYE[:3, 3] - origin))
         si = scene.ray_intersect(mi.Ray3f(eye, mi.Vector3f(rays.T.astype(np.float32))))
-        return np.array(si.t), np.array(si.sh_frame.n).T, np.array(si.uv).T
+        bsdf, context = si.bsdf(), mi.BSDFContext()
+        light = si.to_local(mi.Vector3f(0.3, 0.8, 0.52))
+        return (np.array(si.t), np.array(si.sh_frame.n).T, np.array(si.uv).T, np.concatenate([
+            bsdf.eval(context, si, light, si.is_valid()),
+            bsdf.eval_null_transmission(si, si.is_valid())]).T)
 
-    (t, n, uv), ours = hits(mi.load_dict(theirs), np.zeros(3)), hits(stage.mi_scene, stage.origin)
+    (t, n, uv, scattered), ours = hits(mi.load_dict(theirs), np.zeros(3)), hits(stage.mi_scene, stage.origin)
     seen = np.isfinite(t)
     assert seen.sum() > 50
     np.testing.assert_array_equal(np.isfinite(ours[0]), seen)
@@ -55,6 +59,8 @@ def test_surfaces_are_where_mitsubas_are_and_face_as_they_do(made):
     np.testing.assert_allclose(ours[1][seen], n[seen], atol=2e-2 if name == "lit" else 1e-3)
     if name == "pictured":
         np.testing.assert_allclose(ours[2][seen], uv[seen], atol=1e-3)
+    if name != "lit":  # whose normals are of seven bits
+        np.testing.assert_allclose(ours[3][seen], scattered[seen], atol=1e-3, rtol=1e-2)
 
 
 def test_keys_are_met_and_what_does_not_change_stands_still(tmp_path):

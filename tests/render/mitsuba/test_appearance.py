@@ -262,6 +262,8 @@ ALBEDOS = {
     "blend with plastic": (twosided(blend(CHALK, plastic(0.1, **PAINT))), 1.0),
     "bumpy blend": (wavy(blend(CHALK, conductor(0.1), 0.5)), 0.5),
     "mask of a blend": (masked(blend(CHALK, conductor(0.1), 0.5)), 0.5),
+    "half a metal": (disney(base_color=(0.2, 0.3, 0.4), metallic=0.5), 0.5),
+    "half a glass": (disney(base_color=(0.2, 0.3, 0.4), metallic=0.2, spec_trans=0.5), 0.4),
     "chalk before metal": ({"type": "twosided", "a": CHALK, "b": conductor(0.1)}, 1.0),
 }
 
