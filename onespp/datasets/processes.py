@@ -4,8 +4,8 @@ end this one.
 A process reads its calls, a line of JSON each, and answers likewise. It ends with its input, so
 with the process that started it, however that ends. Whatever else it says is kept for the log.
 
-Not by `concurrent.futures`, whose pool is broken for all calls when one process is killed, and whose
-fresh processes import the caller's program again.
+Not by `concurrent.futures`, whose pool is broken for all calls when one process is killed, and
+whose fresh processes import the caller's program again.
 """
 
 from __future__ import annotations

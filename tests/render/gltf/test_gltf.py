@@ -51,7 +51,8 @@ def test_surfaces_are_where_mitsubas_are_and_scatter_as_they_do(made):
             bsdf.eval(context, si, light, si.is_valid()),
             bsdf.eval_null_transmission(si, si.is_valid())]).T)
 
-    (t, n, uv, scattered), ours = hits(mi.load_dict(theirs), np.zeros(3)), hits(stage.mi_scene, stage.origin)
+    t, n, uv, scattered = hits(mi.load_dict(theirs), np.zeros(3))
+    ours = hits(stage.mi_scene, stage.origin)
     seen = np.isfinite(t)
     assert seen.sum() > 50
     np.testing.assert_array_equal(np.isfinite(ours[0]), seen)
