@@ -32,7 +32,8 @@ def render(scene: str, out: Path | None, device: str, threads: int | None, **opt
     """
     use(device, threads)
     sequence = render_to(scene, out, **options)
-    click.echo(f"rendered {len(sequence.frames)} frames into {sequence.folder}")
+    part = f"part {options['part']} of " if options["part"] else ""
+    click.echo(f"rendered {part}{len(sequence.frames)} frames into {sequence.folder}")
 
 
 def render_to(name: str, out: Path | None, *, frames: str | None = None, size: str | None = None,

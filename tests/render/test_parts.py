@@ -44,3 +44,10 @@ def test_parts_that_cannot_be_are_refused(tmp_path, options, words):
     with pytest.raises(InputError, match=words):
         onespp.render(small_scene(), tmp_path / "s", frames=2, size=(8, 12), **options)
     assert not (tmp_path / "s").exists()
+
+
+def test_the_command_says_which_part_is_there(tmp_path, call):
+    options = ("box", "--frames", "0:2", "--size", "12x9", "--out", tmp_path / "box")
+    code, out, err = call("render", *options, "--part", "2/2")
+    assert (code, out) == (0, f"rendered part 2/2 of 2 frames into {tmp_path / 'box'}\n"), err
+    assert sorted(p.name for p in (tmp_path / "box/frames").glob("*.exr")) == ["0001.exr"]
