@@ -1,7 +1,7 @@
 """A frame's light as the signals that are filtered apart, and the frame's colour from them.
 
 Symbols: E emission, D direct and I indirect light, a albedo; U unshadowed light and V the share of
-it that arrives (`render/tracer/lights.py`); G the part of I that a glossy lobe chose.
+it that arrives (`render/tracer/lights/resampling.py`); G the part of I that a glossy lobe chose.
 
     colour = E + V U + a L + G        L = (I - G + D - V U) / a
 
@@ -13,7 +13,7 @@ without a diffuse lobe (its albedo is 1, its roughness below 1) all of that is G
 
 Where several lights meet, V is noise of which of them the shadow ray went to. Frames of such a
 scene have groups of lights g, and several signals V_g: each is known where the ray went to its
-group. With y, omega and P of `lights.py`,
+group. With y, omega and P of `resampling.py`,
 
     colour = E + sum V_g U_g + a L + G
     L = (I - G + D - y U_g / P) / a                sum over pixels of y = that of omega V_g.

@@ -34,6 +34,7 @@ from onespp.scenes.description import (
 
 from . import merged, pictured_lamps, plugins
 from .appearance import Appearance
+from .images import Images, is_clear
 from .variant import check_variant, mi
 
 _SMALL = 0.125   # a scene that reaches less far has a unit of its own
@@ -109,6 +110,10 @@ class MitsubaScene:
         self._parameters.update()
         self.frame = frame
 
+    def world_from_image(self) -> np.ndarray:
+        """(n, 4, 4) float64 by ID of objects and of their images, at the current frame."""
+        return self.images.places(self.frame, self.world_from_object())
+
     def world_from_object(self) -> np.ndarray:
         """(n, 4, 4) float64 by object ID, at the current frame."""
         places = self._still.copy()
@@ -145,6 +150,35 @@ class MitsubaScene:
                 mi.UInt32, self._id_from_face, number - count + face, of_several), number)
         return dr.select(valid, mi.Int32(number), -1)
 
+    def image_id(self, registry_index: Any, face: Any, row: mi.UInt32 | None) -> mi.Int32:
+        """`object_id` of what is seen itself, or of its image.
+
+        Args:
+            row: of `row_of_images`, None where there are no mirrors.
+        """
+        number = self.object_id(registry_index, face)
+        if row is None:
+            return number
+        count = len(self.description.shapes)
+        return dr.select(number >= 0, number + mi.Int32(row * count), number)
+
+    def row_of_images(self, shape: mi.UInt32, several: mi.Bool) -> mi.UInt32:
+        """Which images are seen in a shape, by its registry index, or in several."""
+        row = dr.gather(mi.UInt32, self._image_rows, shape, shape != 0)
+        return dr.select(several, self.images.in_several, row)
+
+    @cached_property
+    def images(self) -> Images:
+        """In the shapes that mirror or let light through."""
+        names = {identifier: name for name, identifier in self._ids.items()}
+        shapes = {_registry_index(shape): shape for shape in self.mi_scene.shapes()}
+        return Images(self.description, shapes,
+                      {i: names[s.id()] for i, s in shapes.items() if s.id() in names})
+
+    @cached_property
+    def _image_rows(self) -> mi.UInt32:
+        return aligned(mi.UInt32, self.images.rows)
+
     @cached_property
     def appearance(self) -> Appearance:
         """What its materials say of themselves."""
@@ -154,6 +188,7 @@ class MitsubaScene:
     def glossy(self) -> bool:
         """Whether any material reflects otherwise than diffusely, or lets light pass straight."""
         return any(mi.has_flag(shape.bsdf().flags(), lobe) for shape in self.mi_scene.shapes()
+                   if not is_clear(shape)
                    for lobe in (mi.BSDFFlags.Glossy, mi.BSDFFlags.Delta))
 
     def sensor(self, height: int, width: int) -> mi.Sensor:

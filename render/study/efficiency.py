@@ -25,7 +25,7 @@ import numpy as np
 
 from onespp.render.host.timed import timed
 from onespp.render.progress import Progress, silent
-from onespp.render.tracer.candidates import candidates_for
+from onespp.render.tracer.lights.candidates import candidates_for
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Scene
 from onespp.show.srgb import srgb_from_linear

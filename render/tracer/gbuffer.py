@@ -13,42 +13,66 @@ import drjit as dr
 from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 
+from .replacement import Replaced
+
 
 @dataclass
 class PrimaryHit:
-    """The first hit of a camera ray. `si` is in the stage's space."""
+    """The first hit of a camera ray. `si` is in the stage's space.
+
+    behind: if it may be behind mirrors; then `ray` is the camera's, and what is told is of its
+    image.
+    """
 
     stage: MitsubaScene
+    ray: mi.Ray3f
     si: mi.SurfaceInteraction3f
     depth_per_length: mi.Float
+    behind: Replaced | None = None
 
 
 def albedo(hit: PrimaryHit) -> mi.Color3f:
-    """Diffuse reflectance, 1 where there is no diffuse lobe: a divisor of light."""
-    return hit.stage.appearance.albedo(hit.si)
+    """Diffuse reflectance, 1 where there is no diffuse lobe: a divisor of light.
+
+    In mirrors it is what is left of it.
+    """
+    value = hit.stage.appearance.albedo(hit.si)
+    if hit.behind is None:
+        return value
+    return dr.select(dr.all(value == 1), value, value * dr.minimum(hit.behind.throughput, 1))
 
 
 def normal(hit: PrimaryHit) -> mi.Vector3f:
     """Shading normal, turned to the side that the camera sees (by the geometric normal)."""
-    return hit.stage.appearance.normal(hit.si)
+    value = hit.stage.appearance.normal(hit.si)
+    return value if hit.behind is None else hit.behind.unfolded(value)
 
 
 def position(hit: PrimaryHit) -> mi.Vector3f:
     origin = mi.Vector3f(*(dr.opaque(mi.Float, value) for value in hit.stage.origin.tolist()))
     unit = dr.opaque(mi.Float, hit.stage.unit)
-    return dr.select(hit.si.is_valid(), dr.fma(mi.Vector3f(hit.si.p), unit, origin), 0)
+    p = hit.si.p
+    if hit.behind is not None:
+        p = dr.select(hit.behind.before > 0, hit.ray(hit.behind.length), p)
+    return dr.select(hit.si.is_valid(), dr.fma(mi.Vector3f(p), unit, origin), 0)
 
 
 def depth(hit: PrimaryHit) -> mi.Float:
-    return dr.select(hit.si.is_valid(), hit.si.t * hit.depth_per_length, 0)
+    length = hit.si.t if hit.behind is None else hit.behind.length
+    return dr.select(hit.si.is_valid(), length * hit.depth_per_length, 0)
 
 
 def object_id(hit: PrimaryHit) -> mi.Int32:
-    return hit.stage.object_id(dr.reinterpret_array(mi.UInt32, hit.si.shape), hit.si.prim_index)
+    return hit.stage.image_id(dr.reinterpret_array(mi.UInt32, hit.si.shape), hit.si.prim_index,
+                              hit.behind and hit.behind.row(hit.stage))
 
 
 def roughness(hit: PrimaryHit) -> mi.Float:
-    return hit.stage.appearance.roughness(hit.si)
+    """Alpha; 0 too where the only specular light is another layer's, of glass before a surface."""
+    value = hit.stage.appearance.roughness(hit.si)
+    if hit.behind is None or hit.behind.other is None:
+        return value
+    return dr.select((value == 1) & (dr.max(hit.behind.other.throughput) > 0), 0, value)
 
 
 GBUFFER: dict[str, Callable[[PrimaryHit], mi.Float | mi.Vector3f | mi.Color3f | mi.Int32]] = {

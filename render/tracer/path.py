@@ -21,14 +21,15 @@ import drjit as dr
 
 from onespp.render.mitsuba.variant import mi
 
-from .candidates import sought_light
-from .lights import DirectLight, Lights, power_heuristic, resample_lights, shape_index
+from .lights.candidates import sought_light
+from .lights.resampling import DirectLight, Lights, power_heuristic, resample_lights, shape_index
+from .replacement import Layer, Replaced
 from .sampler import Sampler, Sobol
 
 SHORT = 8  # segments, up to which paths end by themselves
 FIRST = 5  # segments after which roulette begins, as in Mitsuba
 _LIKELY = 0.95  # the largest probability to go on
-LARGEST_VISIBILITY = 1e4  # picks of 16 lights give up to 2560, by what lights.py lets a pick weigh
+LARGEST_VISIBILITY = 1e4  # picks of 16 lights give up to 2560, as `resampling.py` weighs them
 
 
 @dataclass
@@ -39,7 +40,7 @@ class Radiance:
     hit_distance: from the first hit to the next, 0 if there is none. hit_shape: the shape met
     there, its index in the JIT registry, 0 if there is none; hit_face: which of its faces.
     `unshadowed`, `visibility` and `shadow_ray` are there if direct light was resampled: see
-    `render/tracer/lights.py`.
+    `render/tracer/lights/resampling.py`.
     """
 
     emission: mi.Color3f
@@ -56,7 +57,8 @@ class Radiance:
 
 @dr.syntax
 def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
-          max_depth: int, candidates: int = 1, lights: Lights | None = None) -> Radiance:
+          max_depth: int, candidates: int = 1, lights: Lights | None = None,
+          behind: Replaced | Layer | None = None) -> Radiance:
     """One path a lane.
 
     Args:
@@ -65,6 +67,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         max_depth: longest path in segments, as in Mitsuba (1: emission, 2: direct light).
         candidates: points of the lights that a vertex compares before it sends its shadow ray.
         lights: those that direct light at the first hit is resampled from; None: it is by MIS too.
+        behind: what `ray` and `pi` are behind, if anything.
     """
     context = mi.BSDFContext()
     ray = mi.Ray3f(ray)
@@ -74,21 +77,27 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     hit_distance, hit_shape, hit_face = mi.Float(0), mi.UInt32(0), mi.UInt32(0)
     arrived = mi.Color3f(0)  # direct light, but for what purely specular lobes reflect
     beta, eta = mi.Color3f(1), mi.Float(1)
-    depth = mi.UInt32(0)
+    depth, longest = mi.UInt32(0), max_depth
     previous_p = mi.Point3f(0)
     bsdf_pdf = mi.Float(1)
     from_delta = mi.Bool(True)
     active = mi.Bool(True)
+    if dr.hint(behind is not None, mode="scalar"):
+        beta, longest = mi.Color3f(behind.throughput), max_depth - behind.before
 
     split = None
     if dr.hint(lights is not None, mode="scalar"):
         first = pi.compute_surface_interaction(ray)
         smooth = first.is_valid() & mi.has_flag(first.bsdf().flags(), mi.BSDFFlags.Smooth)
+        if dr.hint(behind is not None, mode="scalar"):
+            smooth &= longest > 1
         split = resample_lights(scene, first, sampler, smooth, lights)
+        if dr.hint(behind is not None, mode="scalar"):
+            split = split.through(behind.throughput)
         direct += split.direct
         arrived += split.direct
 
-    while dr.hint(active, exclude=[split], max_iterations=max_depth, label="path"):
+    while dr.hint(active, exclude=[split, behind], max_iterations=max_depth, label="path"):
         si = pi.compute_surface_interaction(ray)
         bsdf = si.bsdf(ray)
 
@@ -96,7 +105,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         found = beta * _found_light(scene, si, previous_p, bsdf_pdf, from_delta)
 
         # Light that this vertex looks for: one shadow ray.
-        inner = si.is_valid() & (depth + 1 < max_depth)
+        inner = si.is_valid() & (depth + 1 < longest)
         smooth = inner & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         if dr.hint(lights is not None, mode="scalar"):
             smooth &= depth > 0

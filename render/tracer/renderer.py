@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import drjit as dr
@@ -24,11 +25,12 @@ from onespp.render.host.turns import turn
 from onespp.render.mitsuba.variant import mi
 
 from .camera_rays import camera_matrices
-from .candidates import candidates_for
 from .gbuffer import GBUFFER, PrimaryHit
-from .path import sum_of_samples, trace
+from .lights.candidates import candidates_for
+from .path import Radiance, sum_of_samples, trace
+from .replacement import Layer, replaced
 from .replay import replay
-from .sampler import FRAME_STREAM, REFERENCE_STREAM, Sobol, keys_from_seed
+from .sampler import FRAME_STREAM, REFERENCE_STREAM, Sampler, Sobol, keys_from_seed
 from .view import View
 
 _TRACED = {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS}
@@ -76,7 +78,7 @@ class Renderer(View):
         images = {name: self._image(value) for name, value in planes.items()}
         images |= {name: image for name, image in replayed.items() if name in channels}
         return Frame(index, images, matrices.camera_from_world, matrices.screen_from_world,
-                     self.stage.world_from_object())
+                     self.stage.world_from_image())
 
     @turn()
     def sample_sum(self, index: int, seed: int, part: int, count: int, antialias: bool = False,
@@ -104,11 +106,17 @@ class Renderer(View):
             rays = self.rays()
             ray, depth_per_length = rays.at(*self.centres(pixel))
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
+            sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
+            images, seen, row, behind = self.stage.images, ray, None, None
+            if images.any:
+                behind = replaced(scene, ray, pi, sampler, self.scene.max_depth, images.layered)
+                seen, pi, row = behind.ray, behind.pi, behind.row(self.stage)
             planes = {}
             if set(channels) & _TRACED:
-                sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
-                radiance = trace(scene, ray, pi, sampler, self.scene.max_depth,
-                                 self.candidates, self.lights)
+                radiance = trace(scene, seen, pi, sampler, self.scene.max_depth,
+                                 self.candidates, self.lights, behind)
+                if behind and behind.other:
+                    radiance = self._with_other(radiance, behind.other, sampler)
                 unit = dr.opaque(mi.Float, self.stage.unit)
                 planes = {
                     "color": radiance.emission + radiance.direct + radiance.indirect,
@@ -119,15 +127,16 @@ class Renderer(View):
                     "visibility": radiance.visibility,
                     "specular": radiance.specular,
                     "hit_distance": radiance.hit_distance * unit,
-                    "hit_id": self.stage.object_id(radiance.hit_shape, radiance.hit_face),
+                    "hit_id": self.stage.image_id(radiance.hit_shape, radiance.hit_face, row),
                 }
                 if radiance.shadow_ray is not None:
+                    light = radiance.shadow_ray.light
                     planes |= {
-                        "light": radiance.shadow_ray.light * unit,
-                        "light_id": self.stage.object_id(radiance.shadow_ray.light_shape, 0),
+                        "light": (behind.unfolded(light) if behind else light) * unit,
+                        "light_id": self.stage.image_id(radiance.shadow_ray.light_shape, 0, row),
                         "blocker_distance": radiance.shadow_ray.blocker_distance * unit,
-                        "blocker_id": self.stage.object_id(radiance.shadow_ray.blocker_shape,
-                                                           radiance.shadow_ray.blocker_face),
+                        "blocker_id": self.stage.image_id(radiance.shadow_ray.blocker_shape,
+                                                          radiance.shadow_ray.blocker_face, row),
                     }
                     if told := radiance.shadow_ray.groups:
                         planes |= {
@@ -136,9 +145,21 @@ class Renderer(View):
                             **dict(zip(UNSHADOWED, told.unshadowed)),
                         }
             if set(channels) & set(GBUFFER):
-                hit = PrimaryHit(self.stage, pi.compute_surface_interaction(ray), depth_per_length)
+                hit = PrimaryHit(self.stage, ray, pi.compute_surface_interaction(seen),
+                                 depth_per_length, behind)
                 planes |= {name: GBUFFER[name](hit) for name in channels if name in GBUFFER}
             return {name: planes[name] for name in channels}
+
+    def _with_other(self, radiance: Radiance, layer: Layer, sampler: Sampler) -> Radiance:
+        """Light with that of another layer, which is specular."""
+        scene = self.stage.mi_scene
+        pi = scene.ray_intersect_preliminary(layer.ray, coherent=False,
+                                             active=dr.max(layer.throughput) > 0)
+        other = trace(scene, layer.ray, pi, sampler, self.scene.max_depth, self.candidates,
+                      behind=layer)
+        light = other.emission + other.direct + other.indirect
+        return replace(radiance, indirect=radiance.indirect + light,
+                       specular=radiance.specular + light)
 
     @dr.syntax
     def _trace_samples(self, index: int, seed: int, part: int, start: int, count: int,

@@ -13,10 +13,10 @@ from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Scene
 
 from .camera_rays import NO_JITTER, Offset, PixelRays, halton, pixel_rays
-from .candidates import candidates_for
-from .lights import Lights
+from .lights.candidates import candidates_for
+from .lights.resampling import Lights
+from .lights.scene_lights import find_lights
 from .sampler import BlueNoise, Keys, Pcg, Sampler, Sobol, z_order
-from .scene_lights import find_lights
 
 _SAMPLERS: dict[str, Callable[[Keys, Any, int], Sampler]] = {
     "pcg": lambda keys, pixel, width: Pcg(keys, pixel),

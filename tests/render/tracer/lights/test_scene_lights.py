@@ -7,8 +7,8 @@ import pytest
 
 from onespp.render.channels import GROUPED, UNSHADOWED
 from onespp.render.errors import InputError
+from onespp.render.tracer.lights.scene_lights import MOST_STRATA, SPARE, cut, share_out
 from onespp.render.tracer.renderer import Renderer
-from onespp.render.tracer.scene_lights import MOST_STRATA, SPARE, cut, share_out
 from onespp.scenes import catalog
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.materials import diffuse

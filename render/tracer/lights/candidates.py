@@ -23,9 +23,9 @@ from __future__ import annotations
 import drjit as dr
 
 from onespp.render.mitsuba.variant import mi
+from onespp.render.tracer.sampler import Sampler
 
-from .lights import power_heuristic
-from .sampler import Sampler
+from .resampling import power_heuristic
 
 GOLDEN = 0.6180339887498949  # fractional part; its multiples spread evenly over [0, 1)
 FEWEST, MOST = 2, 8

@@ -13,7 +13,7 @@ import pytest
 
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer import renderer as renderer_module
-from onespp.render.tracer.candidates import candidates_for
+from onespp.render.tracer.lights.candidates import candidates_for
 from onespp.render.tracer.path import trace
 from onespp.render.tracer.renderer import Renderer
 from onespp.render.tracer.sampler import REFERENCE_STREAM, Sobol, keys_from_seed

@@ -27,9 +27,9 @@ from onespp.render.channels import MOST_GROUPS
 from onespp.render.host.aligned import aligned
 from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
+from onespp.render.tracer.camera_rays import pixel_rays
 
-from .camera_rays import pixel_rays
-from .lights import Lights, contribution, stratum_word
+from .resampling import Lights, contribution, stratum_word
 
 FEW = 8
 MOST_STRATA = 128

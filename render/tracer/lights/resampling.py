@@ -36,14 +36,13 @@ Source: resampled importance sampling (Talbot et al. 2005) with the ratio estima
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
 
 from onespp.render.mitsuba.variant import mi
-
-from .sampler import Sampler
+from onespp.render.tracer.sampler import Sampler
 
 DELTA = 0.1
 _DIMMEST = 1e-6  # share of l(U): a group that gives less has no visibility
@@ -95,6 +94,13 @@ class DirectLight:
     blocker_shape: mi.UInt32
     blocker_face: mi.UInt32
     groups: GroupSample | None = None
+
+    def through(self, throughput: mi.Color3f) -> DirectLight:
+        """The same, seen in mirrors that leave so much of it."""
+        groups = self.groups and replace(
+            self.groups, unshadowed=[throughput * u for u in self.groups.unshadowed])
+        return replace(self, direct=throughput * self.direct,
+                       unshadowed=throughput * self.unshadowed, groups=groups)
 
 
 @dr.syntax

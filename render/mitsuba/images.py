@@ -1,0 +1,146 @@
+"""Images in mirrors and glass: which shapes show others in them, and how what they show moves.
+
+Primary surface replacement shows, where there is a mirror or clear glass, the first surface behind
+it that scatters light, at the place of its image (`render/tracer/replacement.py`). An object's
+image in a mirror is an object of its own: it has an ID, and a matrix that says how it moves. With
+the object's place M_o and the mirror's A at a frame, that matrix is
+
+    R M_o    in a flat mirror, R being the reflection in its plane, which A moves: exact;
+    A        in any other, and in bent glass: what they show moves with them, nearly, if small;
+    1        in one after another, and in those that have no row of their own.
+
+(Behind a pane an object is where it is: that is no image.) So whoever reprojects by matrices
+follows images as they follow objects, and needs to know nothing of mirrors.
+
+Source: primary surface replacement, as in Zimmer et al. 2015, "Path-space motion estimation and
+decomposition for robust animation filtering"; that images are objects is our own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from onespp.scenes.description import Disk, Mesh, Rectangle, Scene, Shape
+
+from .variant import mi
+
+THROUGH = +mi.BSDFFlags.DeltaTransmission | +mi.BSDFFlags.Null
+CLEAR = +mi.BSDFFlags.DeltaReflection | THROUGH
+MOST = 16  # shapes whose images have matrices of their own
+_FLAT = 1e-5  # a mesh's thickness, as a share of its size
+_STRAIGHT = 1e-3  # difference of the normals of a flat mesh
+
+
+class Images:
+    """Those of a scene.
+
+    Attributes:
+        rows: (registry indices) uint32, which row of images is in a shape, from 1; 0: none.
+        in_several: the row of what is seen in one after another. layered: whether anything lets
+            light through.
+
+    Args:
+        shapes: Mitsuba's, by registry index. names: of those that are one object each.
+    """
+
+    def __init__(self, scene: Scene, shapes: Mapping[int, mi.Shape],
+                 names: Mapping[int, str]) -> None:
+        self._scene = scene
+        by_name = {shape.name: shape for shape in scene.shapes}
+        found = [index for index, shape in shapes.items() if is_clear(shape)]
+        listed = sorted((i for i in found if i in names), key=names.__getitem__)[:MOST]
+        self._mirrors = [by_name[names[i]] for i in listed]
+        self._planes = [_plane(shape) for shape in self._mirrors]
+        self.layered = any(_lobes(shape) & THROUGH for shape in shapes.values())
+        self.in_several = len(listed) + 1
+        self.rows = np.zeros(max(shapes) + 1, np.uint32)
+        self.rows[found] = self.in_several
+        self.rows[listed] = 1 + np.arange(len(listed))
+
+    @property
+    def any(self) -> bool:
+        """Whether there is anything that primary surfaces can be behind."""
+        return self.layered or self._are_there
+
+    @property
+    def _are_there(self) -> bool:
+        return bool(self.rows.any())
+
+    def names(self) -> tuple[str, ...]:
+        """Of objects and then of their images, mirror by mirror, in order of ID."""
+        objects = self._scene.object_names
+        if not self._are_there:
+            return objects
+        mirrors = [mirror.name for mirror in self._mirrors]
+        names = [*objects, *(f"{name} in {mirror}" for mirror in mirrors for name in objects),
+                 *(f"{name} in several" for name in objects)]
+        taken: set[str] = set()
+        for i, name in enumerate(names):
+            while name in taken:
+                name += "'"
+            names[i] = name
+            taken.add(name)
+        return tuple(names)
+
+    def moving(self) -> tuple[str, ...]:
+        """Those of `names` that have matrices which change."""
+        shapes = self._scene.shapes
+        moves = [shape.moves for shape in shapes]
+        if self._are_there:
+            for mirror, plane in zip(self._mirrors, self._planes):
+                moves += [mirror.moves or (plane is not None and shape.moves) for shape in shapes]
+            moves += [False] * len(shapes)
+        return tuple(name for name, is_so in zip(self.names(), moves, strict=True) if is_so)
+
+    def places(self, frame: float, world_from_object: np.ndarray) -> np.ndarray:
+        """(n, 4, 4) of the objects -> those of objects and images, by ID, float64."""
+        if not self._are_there:
+            return world_from_object
+        places = [world_from_object]
+        for mirror, plane in zip(self._mirrors, self._planes):
+            at = mirror.world_from_object_at(frame)
+            if plane is None:
+                places.append(np.broadcast_to(at, world_from_object.shape))
+            else:
+                places.append(_reflection(at, *plane) @ world_from_object)
+        places.append(np.broadcast_to(np.eye(4), world_from_object.shape))
+        return np.concatenate(places)
+
+
+def is_clear(shape: mi.Shape) -> bool:
+    """Whether a surface reflects and lets through in one direction each, and does nothing else."""
+    lobes = _lobes(shape)
+    return bool(lobes) and not lobes & ~CLEAR and not shape.is_emitter()
+
+
+def _lobes(shape: mi.Shape) -> int:
+    return shape.bsdf().flags() & +mi.BSDFFlags.All
+
+
+def _plane(shape: Shape) -> tuple[np.ndarray, np.ndarray] | None:
+    """A point and the normal, in object space, of a flat shape; None of another."""
+    if isinstance(shape.geometry, Rectangle | Disk):
+        return np.zeros(3), np.array([0.0, 0.0, 1.0])
+    if not isinstance(shape.geometry, Mesh):
+        return None
+    vertices, normals = shape.geometry.vertices, shape.geometry.normals
+    middle = vertices.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(vertices - middle, full_matrices=False)
+    is_flat = len(sizes) == 3 and sizes[2] <= _FLAT * sizes[0]
+    is_bent = normals is not None and np.ptp(normals, axis=0).max() > _STRAIGHT
+    return (middle, axes[2]) if is_flat and not is_bent else None
+
+
+def _reflection(world_from_object: np.ndarray, point: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """(4, 4) in the plane that a shape's matrix takes its plane to; of no plane, the identity."""
+    linear, moved = world_from_object[:3, :3], np.eye(4)
+    a, b = np.linalg.svd(normal[None])[2][1:]  # along the plane
+    n = np.cross(linear @ a, linear @ b)
+    length = np.linalg.norm(n)
+    if length > 0:
+        n /= length
+        moved[:3, :3] -= 2 * np.outer(n, n)
+        moved[:3, 3] = 2 * n * (n @ (linear @ point + world_from_object[:3, 3]))
+    return moved

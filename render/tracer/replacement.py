@@ -1,0 +1,219 @@
+"""Primary surface replacement: the first surface that scatters light, behind mirrors and glass.
+
+What a mirror shows is as good to filter as what the camera sees itself, if a frame tells of it what
+it tells of that. So the camera's ray is followed through mirrors, clear glass and the holes of
+masks, and the surface that it comes to is the pixel's: radiance is split there, and the G-buffer is
+that of its image. Where a surface both reflects and lets through, the ray follows what is more of
+it; the rest, a layer of its own, is a path of its own, whose light counts as specular.
+
+Symbols: t_i, the length of segment i; n_i, the shading normal at its end, toward the ray; k_i, the
+mean curvature there, positive if the surface bulges toward the ray; eta_i, the index of refraction
+behind the surface over that before it; d, the ray's direction from the camera.
+
+    throughput  product of reflectances and transmittances; it is in all light, and in the albedo,
+                so that light over albedo is the irradiance of the surface.
+    unfolding   H, directions at the surface -> those of its image: the product of 1 - 2 n_i n_i^T
+                where it was reflected, and of the shortest turn back where it was refracted.
+    length      of the image from the camera. What is s behind a surface is seen at
+
+                    s / (1 + 2 k_i s)               in a mirror,
+                    s / (eta_i - (eta_i - 1) k_i s)   through glass,
+
+                and s -> t_i + that, from the last surface to the first: flat mirrors add up
+                lengths. An image behind the camera counts as if all were flat and nothing bent.
+    place       camera + length d: it projects to its pixel, as a surface does.
+
+A bent surface's image is only nearly at rest when the camera moves (that depends on the angle, and
+differs along and across), which is what methods have to bear with.
+
+The mean of a frame is what it was: what is followed is not random, and of the layers left aside one
+is picked in proportion to its luminance. (A mask that is neither open nor closed is as any surface
+here: its paths go through or not by chance, and the guides are its own.)
+
+Source: Zimmer et al. 2015, "Path-space motion estimation and decomposition for robust animation
+filtering", section 4; lengths by the paraxial equations of a spherical mirror and of a refracting
+sphere (Hecht, "Optics", chapter 5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+
+from onespp.render.mitsuba.images import CLEAR, THROUGH
+from onespp.render.mitsuba.scene import MitsubaScene
+from onespp.render.mitsuba.variant import mi
+
+from .lights.resampling import shape_index
+from .sampler import Sampler
+
+_NOT_CLEAR = +mi.BSDFFlags.All & ~CLEAR
+_FARTHEST = 1e7  # times the length along the ray, of images
+_BENDS = 1e-5  # curvature times length, below which a pane leaves things where they are
+
+
+@dataclass
+class Layer:
+    """A ray that leaves a pixel's chain of surfaces, and what of its light the pixel shows.
+
+    throughput: 0 where there is none, over the probability of its having been picked. before:
+    segments before it.
+    """
+
+    ray: mi.Ray3f
+    throughput: mi.Color3f
+    before: mi.UInt32
+
+
+@dataclass
+class Replaced:
+    """Where a camera ray came to.
+
+    ray, pi: the last segment, and its hit. throughput: of the surfaces before. before: segments
+    before the last. length: of the image from the camera, in stage units. columns: of H. images:
+    the shape that it is an image in, its index in the JIT registry, 0 for none; several: whether
+    there is another. other: what else is seen there, if anything in the scene is clear.
+    """
+
+    ray: mi.Ray3f
+    pi: mi.PreliminaryIntersection3f
+    throughput: mi.Color3f
+    before: mi.UInt32
+    length: mi.Float
+    columns: tuple[mi.Vector3f, mi.Vector3f, mi.Vector3f]
+    images: mi.UInt32
+    several: mi.Bool
+    other: Layer | None
+
+    def unfolded(self, v: mi.Vector3f) -> mi.Vector3f:
+        """H v: a direction at the surface, as the image has it."""
+        x, y, z = self.columns
+        return dr.fma(x, v.x, dr.fma(y, v.y, z * v.z))
+
+    def row(self, stage: MitsubaScene) -> mi.UInt32:
+        """Of `Images`: which images it is among."""
+        return stage.row_of_images(self.images, self.several)
+
+
+@dr.syntax
+def replaced(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
+             max_depth: int, layered: bool) -> Replaced:
+    """The surfaces behind mirrors and glass, of rays and their first hits.
+
+    Args:
+        sampler: advanced if `layered`. max_depth: longest path in segments, those before the
+            surface included. layered: whether anything in the scene lets light through.
+    """
+    reflect, through = mi.BSDFContext(), mi.BSDFContext()
+    reflect.type_mask, through.type_mask = mi.BSDFFlags.DeltaReflection, THROUGH
+    ray, pi = mi.Ray3f(ray), mi.PreliminaryIntersection3f(pi)
+    throughput, before = mi.Color3f(1), mi.UInt32(0)
+    images, several = mi.UInt32(0), mi.Bool(False)
+    x, y, z = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0), mi.Vector3f(0, 0, 1)
+    a, b, c, e = mi.Float(1), mi.Float(0), mi.Float(0), mi.Float(1)  # s -> (a s + b) / (c s + e)
+    along = mi.Float(0)
+    other = Layer(mi.Ray3f(ray), mi.Color3f(0), mi.UInt32(0))
+    total, picked = mi.Float(0), mi.Float(1)
+    left = mi.Float(0)
+    if dr.hint(layered, mode="scalar"):
+        left = sampler.next_1d()
+    active = pi.is_valid() & (max_depth > 1)
+
+    while dr.hint(active, max_iterations=max_depth, label="images"):
+        si = pi.compute_surface_interaction(ray, mi.RayFlags.All | mi.RayFlags.dNSdUV, active)
+        bsdf = si.bsdf()
+        lobes = bsdf.flags() & +mi.BSDFFlags.All
+        is_clear = (active & ((lobes & _NOT_CLEAR) == 0) & (lobes != 0)
+                    & ~si.shape.is_emitter())
+        sample, weight = bsdf.sample(reflect, si, 0.5, mi.Point2f(0.5), is_clear)
+        wo, eta, passes = mi.Vector3f(sample.wo), mi.Float(1), mi.Bool(False)
+        if dr.hint(layered, mode="scalar"):
+            is_hole = active & ((lobes & +mi.BSDFFlags.Null) != 0)
+            is_hole &= dr.min(bsdf.eval_null_transmission(si, is_hole)) >= 1
+            beyond, share = bsdf.sample(through, si, 0.5, mi.Point2f(0.5), is_clear)
+            passes = is_hole | (dr.max(share) > dr.max(weight))
+            rest = throughput * dr.select(is_hole, 0, dr.select(passes, weight, share))
+            aside = si.spawn_ray(si.to_world(dr.select(passes, sample.wo, beyond.wo)))
+            brightness = dr.select(active & (is_clear | is_hole), mi.luminance(rest), 0)
+            total += brightness
+            chance = dr.select(total > 0, brightness / total, 0)
+            taken = left < chance
+            other.ray = dr.select(taken, aside, other.ray)
+            other.throughput = dr.select(taken, rest, other.throughput)
+            other.before = dr.select(taken, before + 1, other.before)
+            picked = dr.select(taken, brightness, picked)
+            left = dr.select(taken, left / chance, (left - chance) / dr.maximum(1 - chance, 1e-9))
+            left = dr.clip(left, 0, 1 - 2.0**-24)
+            wo = dr.select(is_hole, -si.wi, dr.select(passes, beyond.wo, wo))
+            weight = dr.select(is_hole, 1, dr.select(passes, share, weight))
+            eta = dr.select(passes & ~is_hole, beyond.eta, 1)
+            is_clear |= is_hole
+        active &= is_clear & (dr.max(weight) > 0)
+
+        if active:
+            throughput *= weight
+            t = pi.t
+            onward = si.to_world(wo)
+            k = _curvature(si)
+            p, q = dr.select(passes, eta, 1), dr.select(passes, (1 - eta) * k, 2 * k)
+            a, b, c, e = (dr.fma(a, dr.fma(t, q, 1), b * q), p * dr.fma(a, t, b),
+                          dr.fma(c, dr.fma(t, q, 1), e * q), p * dr.fma(c, t, e))
+            along += t
+            # Columns of H: turned by what takes the direction onward to the one before.
+            n = dr.normalize(onward - ray.d)
+            folded = _combined(x, y, z, n)
+            if ~passes:
+                x, y, z = x - 2 * n.x * folded, y - 2 * n.y * folded, z - 2 * n.z * folded
+            else:
+                x, y, z = _turned(x, y, z, onward, ray.d)
+            shape = shape_index(pi.shape, active)
+            is_image = ~passes | ((eta != 1) & (dr.abs(k) * t > _BENDS))
+            several |= is_image & (images != 0) & (images != shape)
+            images = dr.select(is_image & (images == 0), shape, images)
+            before += 1
+            ray = si.spawn_ray(onward)
+            pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+            active &= pi.is_valid() & (before + 1 < max_depth)
+
+    plain = along + pi.t
+    length = dr.fma(a, pi.t, b) / dr.fma(c, pi.t, e)
+    length = dr.select((length > 0) & (length < _FARTHEST * plain), length, plain)
+    other.throughput *= dr.select(total > 0, total / picked, 0)
+    return Replaced(ray, pi, throughput, before, length, (x, y, z), images, several,
+                    other if layered else None)
+
+
+def _combined(x: mi.Vector3f, y: mi.Vector3f, z: mi.Vector3f, v: mi.Vector3f) -> mi.Vector3f:
+    return dr.fma(x, v.x, dr.fma(y, v.y, z * v.z))
+
+
+def _turned(x: mi.Vector3f, y: mi.Vector3f, z: mi.Vector3f, a: mi.Vector3f,
+            b: mi.Vector3f) -> tuple[mi.Vector3f, mi.Vector3f, mi.Vector3f]:
+    """Columns of H times the shortest rotation that takes a to b (unit, less than 180 degrees).
+
+    Source: Moller and Hughes 1999, "Efficiently building a matrix to rotate one vector to another".
+    """
+    v, cosine = dr.cross(a, b), dr.dot(a, b)
+    h = dr.rcp(1 + cosine)
+    row_x = mi.Vector3f(dr.fma(h * v.x, v.x, cosine), dr.fma(h * v.x, v.y, v.z),
+                        dr.fma(h * v.x, v.z, -v.y))
+    row_y = mi.Vector3f(dr.fma(h * v.x, v.y, -v.z), dr.fma(h * v.y, v.y, cosine),
+                        dr.fma(h * v.y, v.z, v.x))
+    row_z = mi.Vector3f(dr.fma(h * v.x, v.z, v.y), dr.fma(h * v.y, v.z, -v.x),
+                        dr.fma(h * v.z, v.z, cosine))
+    # (row_i is the rotation's i-th column.)
+    return (_combined(x, y, z, row_x), _combined(x, y, z, row_y), _combined(x, y, z, row_z))
+
+
+def _curvature(si: mi.SurfaceInteraction3f) -> mi.Float:
+    """Mean curvature of the shading normals, positive where it bulges toward `si.wi`.
+
+    Source: do Carmo 1976, "Differential geometry of curves and surfaces", section 3.3.
+    """
+    u, v = si.dp_du, si.dp_dv
+    e, f, g = dr.dot(u, u), dr.dot(u, v), dr.dot(v, v)
+    twice = (g * dr.dot(si.dn_du, u) - f * (dr.dot(si.dn_du, v) + dr.dot(si.dn_dv, u))
+             + e * dr.dot(si.dn_dv, v)) / (e * g - f * f)
+    h = 0.5 * dr.select(dr.isfinite(twice), twice, 0)
+    return dr.select(dr.dot(si.sh_frame.n, si.to_world(si.wi)) < 0, -h, h)
