@@ -2,11 +2,11 @@
 
     colour = E + V' U + R'        R = D + I - V U
 
-E emission, U unshadowed light and V the share of it that arrives, D and I direct and indirect
-light (`render/tracer/lights/resampling.py`). V' is the network's result for V as a grey image, with
-albedo 1 and the normals; R' its result for R, with albedo and normals. U has no noise, so that texture and
-shading of direct light stay as they are, as in our own methods: what these are ahead of this one
-is not owed to the split.
+E emission, U unshadowed light and V the share of it that arrives, D and I direct and indirect light
+(`render/tracer/lights/resampling.py`). V' is the network's result for V as a grey image, with
+albedo 1 and the normals; R' its result for R, with albedo and normals. U has no noise, so that
+texture and shading of direct light stay as they are, as in our own methods: what these are ahead of
+this one is not owed to the split.
 
 V is capped at `LARGEST_VISIBILITY` and what is above is left in R, as in `inputs/signals.py`. A
 frame that lacks the split is denoised as `Oidn` does it.
