@@ -31,7 +31,7 @@ Visibility has two histories, where the surface was and where its shadow was: `s
 Where the latter is taken, W is less by as much as its e^2 is, smoothed, and at least 0.
 
 Of groups of lights a pixel's ray tells of one, y with the weight omega (`resampling.py`): signals
-are *sparse*. Their innovation is e = y - omega h, 0 where the ray went elsewhere, and a smoothing is
+are *sparse*. Their innovation is e = y - omega h, 0 where the ray went elsewhere; a smoothing is
 a ratio of sums, S[e] / S[omega], without noise of which light was picked. History takes
 
     h <- h + f S[e] / S[omega] + a (e - omega S[e] / S[omega]),   a = max(1 / (N + 1/2), ...),
