@@ -98,6 +98,24 @@ def glass(index: float = 1.5) -> dict[str, Any]:
     return {"type": "dielectric", "int_ior": float(index)}
 
 
+def pane(index: float = 1.5) -> dict[str, Any]:
+    """A sheet of clear glass, for open surfaces: both of its sides at once, without thickness."""
+    return {"type": "thindielectric", "int_ior": float(index)}
+
+
+def cutout(material: Mapping[str, Any], opacity: np.ndarray) -> dict[str, Any]:
+    """A material where `opacity` is, (h, w) bool, first row at the top; else a hole.
+
+    Each texel is wholly one or the other, so that pixels behind holes have guides of their own.
+    """
+    texels = np.asarray(opacity, float)
+    if texels.ndim != 2 or not texels.size or not np.isin(texels, (0, 1)).all():
+        raise SceneError(f"the opacity of a cutout has shape {texels.shape} or other values than 0 "
+                         "and 1: use an (h, w) array of bool")
+    return {"type": "mask", "bsdf": dict(material), "opacity": {
+        "type": "bitmap", "bitmap": texels[..., None], "raw": True, "filter_type": "nearest"}}
+
+
 def checks(a: Color, b: Color, repeat: tuple[float, float] = (4, 4)) -> dict[str, Any]:
     """A checkerboard with `repeat` pairs of squares along u and v."""
     return {"type": "checkerboard", "color0": a, "color1": b,

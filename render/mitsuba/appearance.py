@@ -104,7 +104,9 @@ class Appearance:
         """
         valid = si.is_valid()
         seen_from_behind = dr.dot(si.n, si.to_world(si.wi)) < 0
-        n = mi.Vector3f(dr.select(seen_from_behind, -si.sh_frame.n, si.sh_frame.n))
+        # (The two normals of a rectangle that its matrix mirrors are opposite to one another.)
+        is_turned = seen_from_behind ^ (dr.dot(si.n, si.sh_frame.n) < 0)
+        n = mi.Vector3f(dr.select(is_turned, -si.sh_frame.n, si.sh_frame.n))
         if self._mapped:
             smooth = mi.Vector3f(n)
             shape = mi.UInt32(dr.reinterpret_array(mi.UInt32, si.shape))

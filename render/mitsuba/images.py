@@ -109,6 +109,11 @@ class Images:
         return np.concatenate(places)
 
 
+def only_mirrors(shape: mi.Shape) -> bool:
+    """Whether a surface reflects in one direction, and does nothing else."""
+    return is_clear(shape) and not _lobes(shape) & THROUGH
+
+
 def is_clear(shape: mi.Shape) -> bool:
     """Whether a surface reflects and lets through in one direction each, and does nothing else."""
     lobes = _lobes(shape)

@@ -34,7 +34,7 @@ from onespp.scenes.description import (
 
 from . import merged, pictured_lamps, plugins
 from .appearance import Appearance
-from .images import Images, is_clear
+from .images import Images, only_mirrors
 from .variant import check_variant, mi
 
 _SMALL = 0.125   # a scene that reaches less far has a unit of its own
@@ -186,9 +186,12 @@ class MitsubaScene:
 
     @property
     def glossy(self) -> bool:
-        """Whether any material reflects otherwise than diffusely, or lets light pass straight."""
+        """Whether light is left that some material reflects, or lets pass, in a lobe of its own.
+
+        Not of mirrors: what they show is looked for there (`images`).
+        """
         return any(mi.has_flag(shape.bsdf().flags(), lobe) for shape in self.mi_scene.shapes()
-                   if not is_clear(shape)
+                   if not only_mirrors(shape)
                    for lobe in (mi.BSDFFlags.Glossy, mi.BSDFFlags.Delta))
 
     def sensor(self, height: int, width: int) -> mi.Sensor:

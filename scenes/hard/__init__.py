@@ -16,7 +16,8 @@ from .extent import far, huge, sky, tiny
 from .light import color, emitters, fireflies, moving_light, switched_off, switched_on
 from .motion import appears, behind, enters, leaves, mirrored, shrinks, uncovers, vanishes
 from .parts import EVENT
-from .reflection import glossy_floor, mirror
+from .reflection import glossy_floor, mirror, moving_mirror
+from .see_through import foliage, glass_ball, thin_glass, window
 from .surface import dark, textured, thin
 
 
@@ -44,7 +45,12 @@ HARD: Mapping[str, Hard] = MappingProxyType({
     "emitters": Hard(emitters),
     "fireflies": Hard(fireflies, diffuse=False),
     "mirror": Hard(mirror, diffuse=False),
+    "moving-mirror": Hard(moving_mirror, diffuse=False),
     "glossy-floor": Hard(glossy_floor, diffuse=False),
+    "glass-ball": Hard(glass_ball, diffuse=False),
+    "window": Hard(window, diffuse=False),
+    "thin-glass": Hard(thin_glass, diffuse=False),
+    "foliage": Hard(foliage, diffuse=False),
     "backwards": Hard(backwards),
     "grazing": Hard(grazing),
     "uncovers": Hard(uncovers),

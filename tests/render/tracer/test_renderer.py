@@ -183,8 +183,8 @@ def test_gbuffer_agrees_with_mitsubas_own_at_the_same_points():
     np.testing.assert_allclose(np.where(frame["id"] >= 0, length, 0), expected, atol=2e-4)
 
 
-def test_albedo_is_one_where_a_surface_only_mirrors():
-    mirror = {"type": "conductor", "material": "none"}
+def test_albedo_is_one_where_a_surface_is_a_rough_mirror():
+    mirror = {"type": "roughconductor", "material": "none"}
     shapes = tuple(replace(shape, material=mirror) if shape.name == "ball" else shape
                    for shape in small_scene().shapes)
     frame = Renderer(small_scene(shapes=shapes), HEIGHT, WIDTH).frame(4)

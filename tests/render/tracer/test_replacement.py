@@ -1,0 +1,202 @@
+"""Primary surface replacement: images are where mirrors and glass put them; the mean stays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from onespp.render.channels import FRAME, GLOSS
+from onespp.render.tracer.renderer import Renderer
+from onespp.scenes.description import Camera, Disk, Rectangle, Scene, Shape, Sphere
+from onespp.scenes.hard import HARD
+from onespp.scenes.materials import checks, cutout, diffuse, glass, mirror, pane
+from onespp.scenes.meshes import box
+from onespp.scenes.transforms import look_at, rotate, scale, translate
+from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
+
+H, W = 36, 48
+X, Y = (1, 0, 0), (0, 1, 0)
+FLOOR = Shape("floor", Rectangle(), diffuse(checks((0.7, 0.7, 0.7), (0.2, 0.3, 0.4))),
+              rotate(X, -90) @ scale(5))
+BALL = Shape("ball", Sphere(), diffuse((0.6, 0.1, 0.1)),
+             lambda f: translate((-0.6 + 0.2 * f, 0.5, 0.4)) @ rotate(Y, 10 * f) @ scale(0.4))
+LAMP = Shape("lamp", Disk(), diffuse((0, 0, 0)), translate((0, 4, 1)) @ rotate(X, 90),
+             (12.0, 11.0, 9.0))
+CAMERA = Camera(look_at((0.2, 1.4, 5), (0, 0.8, 0)), fov=40)
+
+
+def seen(*shapes: Shape, frame: int = 2, camera: Camera = CAMERA, depth: int = 5):
+    """A frame, and the names of what its IDs stand for."""
+    scene = Scene("seen", "for a test", (FLOOR, BALL, LAMP, *shapes), camera, 6, W, H, depth)
+    renderer = Renderer(scene, H, W, direct="resampled")
+    return renderer.frame(frame, channels=renderer.channels), renderer.stage.images.names()
+
+
+def reflection(point, normal) -> np.ndarray:
+    n, moved = np.asarray(normal, float) / np.linalg.norm(normal), np.eye(4)
+    moved[:3, :3] -= 2 * np.outer(n, n)
+    moved[:3, 3] = 2 * n * (n @ point)
+    return moved
+
+
+def guides_of(frame, mask) -> dict[str, np.ndarray]:
+    return {name: frame[name][mask] for name in ("position", "normal", "depth", "albedo")}
+
+
+def at_image(mask) -> np.ndarray:
+    """Without borders, where a rounding decides what is seen."""
+    inner = mask.copy()
+    for axis in (0, 1):
+        for step in (1, -1):
+            inner &= np.roll(mask, step, axis)
+    return inner
+
+
+def test_a_flat_mirror_shows_what_would_be_behind_it():
+    """The guides are those of a scene in which all of it stands behind the mirror's place."""
+    place = translate((0, 1, -1)) @ rotate(Y, 9) @ rotate(X, 4) @ scale((1.5, 1, 1))
+    frame, names = seen(Shape("mirror", Rectangle(), mirror((0.9, 0.8, 0.5)), place))
+    r = reflection(place[:3, 3], place[:3, 2])
+    world = [replace(shape, world_from_object=lambda f, s=shape: r @ s.world_from_object_at(f))
+             for shape in (FLOOR, BALL, LAMP)]
+    scene = Scene("behind", "for a test", tuple(world), CAMERA, 6, W, H)
+    behind = Renderer(scene, H, W).frame(2)
+    for name, fewest in (("floor", 80), ("ball", 4)):
+        image = at_image(frame["id"] == names.index(f"{name} in mirror"))
+        assert image.sum() > fewest
+        assert (behind["id"][image] == scene.object_names.index(name)).all()
+        expected = guides_of(behind, image)
+        expected["albedo"] = expected["albedo"] * np.float32((0.9, 0.8, 0.5))
+        for guide, value in guides_of(frame, image).items():
+            np.testing.assert_allclose(value, expected[guide], rtol=2e-3, atol=2e-3, err_msg=guide)
+
+
+def test_images_in_flat_mirrors_move_by_their_matrices():
+    """Of a mirror that turns, and a ball that rolls: the surface that a pixel shows was, one frame
+    before, where its image's matrix says; algebra of two reflections says where that is."""
+    place = lambda f: translate((0, 1, -1)) @ rotate(Y, 5 * f) @ scale((1.5, 1, 1))  # noqa: E731
+    shape = Shape("mirror", Rectangle(), mirror(), place)
+    (now, names), (before, _) = seen(shape, frame=2), seen(shape, frame=1)
+    for name, moved in (("floor", FLOOR), ("ball", BALL)):
+        i = names.index(f"{name} in mirror")
+        image = now["position"][now["id"] == i].astype(np.float64)
+        assert len(image) > 9
+        step = before.world_from_object[i] @ np.linalg.inv(now.world_from_object[i])
+        r, s = (reflection(place(f)[:3, 3], place(f)[:3, 2]) for f in (2, 1))
+        point = image @ r[:3, :3].T + r[:3, 3]
+        motion = moved.world_from_object_at(1) @ np.linalg.inv(moved.world_from_object_at(2))
+        point = point @ motion[:3, :3].T + motion[:3, 3]
+        expected = point @ s[:3, :3].T + s[:3, 3]
+        np.testing.assert_allclose(image @ step[:3, :3].T + step[:3, 3], expected, atol=1e-6)
+        assert np.abs(expected - image).max() > 0.05
+
+
+def test_what_is_seen_in_two_mirrors_has_been_reflected_twice():
+    """Two of them at a right angle turn what they show by half a turn."""
+    walls = (Shape("left", Rectangle(), mirror(),
+                   translate((-1, 1, -1)) @ rotate(Y, 45) @ scale((1.41, 1, 1))),
+             Shape("right", Rectangle(), mirror(),
+                   translate((1, 1, -1)) @ rotate(Y, -45) @ scale((1.41, 1, 1))))
+    frame, names = seen(*walls, frame=5)
+    image = at_image(frame["id"] == names.index("ball in several"))
+    assert image.sum() > 3
+    corner = np.array([0, 0, -2])  # where the mirrors would meet; y stays
+    point = frame["position"][image] * (-1, 1, -1) + 2 * corner
+    centre = BALL.world_from_object_at(5)[:3, 3]
+    np.testing.assert_allclose(np.linalg.norm(point - centre, axis=1), 0.4, atol=2e-3)
+    np.testing.assert_allclose(frame["normal"][image] * (-1, 1, -1), (point - centre) / 0.4,
+                               atol=1e-2)
+    np.testing.assert_allclose(frame["albedo"][image], np.tile((0.486, 0.081, 0.081), (
+        image.sum(), 1)), atol=1e-3)
+
+
+def _in_a_mirror(s: float, r: float) -> float:
+    return s / (1 + 2 * s / r)
+
+
+def _in_glass(s: float, r: float) -> float:
+    """Through the far side of a ball of glass, and then through the near one."""
+    in_ball = 2 * r + s / (2 / 3 - s / (3 * r))
+    return in_ball / (1.5 - 0.5 * in_ball / r)
+
+
+@pytest.mark.parametrize(("material", "place", "s", "image"), [
+    (mirror(), translate((0, 0, 5)), 4.5, _in_a_mirror),
+    (glass(), translate((0, 0, -0.6)), 0.1, _in_glass),  # upright, and far
+    (glass(), translate((0, 0, -2.5)), 2.0, _in_glass)], ids=["mirror", "near", "upside down"])
+def test_images_in_a_ball_are_where_the_paraxial_equations_say(material, place, s, image):
+    """Along the axis, where those are exact."""
+    r, eye = 0.5, 4.0
+    wall = Shape("wall", Rectangle(), diffuse((0.5, 0.5, 0.5)), place @ scale(9))
+    scene = Scene("axis", "for a test", (Shape("ball", Sphere(), material, scale(r)), wall, LAMP),
+                  Camera(look_at((0, 0, eye), (0, 0, 0)), fov=2), 2, 9, 9, 6)
+    frame = Renderer(scene, 9, 9).frame(0)
+    assert frame["id"][4, 4] == 2 + 3
+    assert frame["depth"][4, 4] == pytest.approx(eye - r + image(s, r), rel=5e-3)
+
+
+def test_what_is_behind_a_pane_or_a_hole_is_itself():
+    """Its ID, its place but for what the pane's glass shifts it by, and its matrices."""
+    plain, _ = seen()
+    stripes = np.zeros((8, 8), bool)
+    stripes[:, ::2] = True
+    panes = {"pane": (Shape("pane", box((2, 1.6, 0.05)), glass(), translate((0, 1, 1.5))), 0.03),
+             "sheet": (Shape("sheet", Rectangle(), pane(), translate((0, 1, 1.5))), 1e-3),
+             "holes": (Shape("holes", Rectangle(), cutout(diffuse((0.2, 0.5, 0.1)), stripes),
+                             translate((0, 1, 1.5))), 3e-4)}
+    for name, (shape, off) in panes.items():
+        frame, names = seen(shape)
+        ball = at_image(frame["id"] == names.index("ball"))
+        assert ball.sum() > 4, name
+        same = at_image(plain["id"] == 0) & ball
+        assert same.sum() > 0.7 * ball.sum()
+        for guide in ("position", "normal"):
+            np.testing.assert_allclose(frame[guide][same], plain[guide][same], atol=4 * off,
+                                       err_msg=f"{guide} of {name}")
+        expected = plain["albedo"][same]
+        left = frame["albedo"][same] / expected
+        assert (left == 1).all() if name == "holes" else ((left < 0.95) & (left > 0.8)).all()
+
+
+@pytest.mark.parametrize("name", ["moving-mirror", "glass-ball", "foliage"])
+def test_frames_have_the_mean_of_the_reference(name):
+    """Which goes through all of it by chance."""
+    renderer = Renderer(replace(HARD[name].make(), max_depth=6), 24, 36, direct="resampled",
+                        sampler="zsobol")
+    ours = [renderer.frame(4, seed, ("color",))["color"] for seed in range(100)]
+    reference = [renderer.sample_sum(4, 9, k, 32) / 32 for k in range(16)]
+    a, b = ([blocks(image, 6) for image in images] for images in (ours, reference))
+    assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
+
+
+def test_what_glass_reflects_is_specular_light_of_its_own():
+    frame, _ = seen(Shape("sheet", Rectangle(), pane(), translate((0, 1, 1.5)) @ rotate(X, -50)))
+    both = (frame["roughness"] == 0) & (frame["id"] >= 0)
+    assert both.sum() > 50
+    assert frame["specular"][both].mean() > 0
+    assert np.all(frame["specular"] <= frame["indirect"] + 1e-6)
+
+
+def test_scenes_without_such_surfaces_have_no_images():
+    frame, names = seen()
+    assert names == ("ball", "floor", "lamp")
+    assert len(frame.world_from_object) == 3
+
+
+def test_images_have_names_of_their_own():
+    odd = Shape("ball in mirror", Sphere(), diffuse((0.5, 0.5, 0.5)), translate((9, 0, 0)))
+    _, names = seen(odd, Shape("mirror", Rectangle(), mirror(), translate((0, 1, -1))))
+    assert len(set(names)) == len(names) == 5 * 3
+    assert {"ball in mirror", "ball in mirror'"} < set(names)
+
+
+def test_channels_of_gloss_come_with_glass_and_not_with_mirrors():
+    shapes = {"mirror": mirror(), "glass": glass()}
+    found = {}
+    for name, material in shapes.items():
+        scene = Scene("seen", "for a test", (FLOOR, LAMP, Shape("it", Sphere(), material)), CAMERA,
+                      1, W, H)
+        found[name] = Renderer(scene, 8, 8).channels
+    assert found == {"mirror": FRAME, "glass": FRAME + GLOSS}
