@@ -109,16 +109,17 @@ def unlike_a_picture(drawn: Drawn, frames: Iterable[Seen]) -> str | None:
     things = [i for i, name in enumerate(names) if name in drawn.things]
     lamps = [names.index(lamp["name"]) for lamp in drawn.record["lamps"]]
     for frame in frames:
-        shown, depth = displayed(frame.color), frame.depth
-        if not shown >= DARKEST:  # NaN, too
+        light, depth = displayed(frame.color), frame.depth
+        if not light >= DARKEST:  # NaN, too
             return f"frame {frame.index} is dark"
-        if shown > BRIGHTEST:
+        if light > BRIGHTEST:
             return f"frame {frame.index} is blown"
         if np.mean((depth > 0) & (depth < _NEAR)) > _MOST_NEAR:
             return f"something is in front of frame {frame.index}"
-        if np.mean(np.isin(frame.id, things)) < _FEWEST_THINGS:
+        shown = np.where(frame.id < 0, -1, frame.id % len(names))  # an image is of what it shows
+        if np.mean(np.isin(shown, things)) < _FEWEST_THINGS:
             return f"frame {frame.index} shows no things"
-        if np.mean(np.isin(frame.id, lamps)) > _MOST_LAMP:
+        if np.mean(np.isin(shown, lamps)) > _MOST_LAMP:
             return f"a lamp is in front of frame {frame.index}"
     return None
 

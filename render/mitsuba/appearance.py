@@ -168,10 +168,10 @@ def _is_told(bsdf: mi.BSDF) -> bool:
     """Whether Mitsuba knows the diffuse reflectance of a material, or it has none."""
     kind, parts = bsdf.class_name(), _objects(bsdf)
     if kind == "TwoSidedBRDF":  # one value for both sides, unless one is not diffuse
-        lobes = {bool(side.flags() & +mi.BSDFFlags.DiffuseReflection) for side in _nested(bsdf)}
-        return len(lobes) == 1 and all(map(_is_told, _nested(bsdf)))
+        lobes = {bool(side.flags() & +mi.BSDFFlags.DiffuseReflection) for side in nested(bsdf)}
+        return len(lobes) == 1 and all(map(_is_told, nested(bsdf)))
     if kind in ("MaskBSDF", *_MAPS):
-        return all(map(_is_told, _nested(bsdf)))
+        return all(map(_is_told, nested(bsdf)))
     if kind in _DISNEY and any(parts[name].is_spatially_varying() or parts[name].max() > 0
                                for name in _NOT_DIFFUSE if name in parts):
         return False
@@ -281,7 +281,7 @@ def _unit(vector: mi.Vector3f, otherwise: mi.Vector3f) -> mi.Vector3f:
 
 
 def _is_mapped(bsdf: mi.BSDF) -> bool:
-    return bsdf.class_name() in _MAPS or any(_is_mapped(part) for part in _nested(bsdf))
+    return bsdf.class_name() in _MAPS or any(_is_mapped(part) for part in nested(bsdf))
 
 
 def _varies(bsdf: mi.BSDF) -> bool:
@@ -289,15 +289,16 @@ def _varies(bsdf: mi.BSDF) -> bool:
     kind, parts = bsdf.class_name(), _objects(bsdf)
     if kind == "TwoSidedBRDF" and len({id(side) for side in _sides(parts)}) > 1:
         return True
-    nested = _nested(bsdf)
-    if not nested and kind not in _MICROFACETS + _DISNEY:
+    parts_of = nested(bsdf)
+    if not parts_of and kind not in _MICROFACETS + _DISNEY:
         return bool(bsdf.flags() & +mi.BSDFFlags.Glossy)  # from the density
     read = [parts[name] for name in ("opacity", "weight", "roughness", "alpha", "alpha_u",
                                      "alpha_v") if name in parts]
-    return any(texture.is_spatially_varying() for texture in read) or any(map(_varies, nested))
+    return any(texture.is_spatially_varying() for texture in read) or any(map(_varies, parts_of))
 
 
-def _nested(bsdf: mi.BSDF) -> Sequence[mi.BSDF]:
+def nested(bsdf: mi.BSDF) -> Sequence[mi.BSDF]:
+    """The materials that one is made of."""
     return [part for part in _objects(bsdf).values() if isinstance(part, mi.BSDF)]
 
 

@@ -24,11 +24,14 @@ import numpy as np
 
 from onespp.scenes.description import Disk, Mesh, Rectangle, Scene, Shape
 
+from .appearance import nested
 from .variant import mi
 
-THROUGH = +mi.BSDFFlags.DeltaTransmission | +mi.BSDFFlags.Null
-CLEAR = +mi.BSDFFlags.DeltaReflection | THROUGH
-MOST = 16  # shapes whose images have matrices of their own
+_CLEAR = ("SmoothConductor", "SmoothDielectric", "ThinDielectric", "Null")
+_AROUND = ("TwoSidedBRDF", "NormalMap", "BumpMap")
+_THROUGH = +mi.BSDFFlags.DeltaTransmission | +mi.BSDFFlags.Null
+MOST = 16  # shapes whose images have matrices of their own, the largest ones,
+MOST_IMAGES = 2048  # of objects, in all of them
 _FLAT = 1e-5  # a mesh's thickness, as a share of its size
 _STRAIGHT = 1e-3  # difference of the normals of a flat mesh
 
@@ -50,10 +53,13 @@ class Images:
         self._scene = scene
         by_name = {shape.name: shape for shape in scene.shapes}
         found = [index for index, shape in shapes.items() if is_clear(shape)]
-        listed = sorted((i for i in found if i in names), key=names.__getitem__)[:MOST]
+        by_size = sorted((i for i in found if i in names),
+                         key=lambda i: (-_area(shapes[i]), names[i]))
+        most = min(MOST, MOST_IMAGES // len(scene.shapes))
+        listed = sorted(by_size[:most], key=names.__getitem__)
         self._mirrors = [by_name[names[i]] for i in listed]
         self._planes = [_plane(shape) for shape in self._mirrors]
-        self.layered = any(_lobes(shape) & THROUGH for shape in shapes.values())
+        self.layered = any(_lobes(shape) & _THROUGH for shape in shapes.values())
         self.in_several = len(listed) + 1
         self.rows = np.zeros(max(shapes) + 1, np.uint32)
         self.rows[found] = self.in_several
@@ -111,17 +117,28 @@ class Images:
 
 def only_mirrors(shape: mi.Shape) -> bool:
     """Whether a surface reflects in one direction, and does nothing else."""
-    return is_clear(shape) and not _lobes(shape) & THROUGH
+    return is_clear(shape) and not _lobes(shape) & _THROUGH
 
 
 def is_clear(shape: mi.Shape) -> bool:
-    """Whether a surface reflects and lets through in one direction each, and does nothing else."""
-    lobes = _lobes(shape)
-    return bool(lobes) and not lobes & ~CLEAR and not shape.is_emitter()
+    """Whether a surface reflects and lets through in one direction each, and does nothing else.
+
+    Of what Mitsuba has, those whose lobes can be asked for one by one (not blends, nor masks).
+    """
+    return not shape.is_emitter() and _only(shape.bsdf(), _CLEAR)
+
+
+def _only(bsdf: mi.BSDF, kinds: tuple[str, ...]) -> bool:
+    kind = bsdf.class_name()
+    return kind in kinds or (kind in _AROUND and all(_only(part, kinds) for part in nested(bsdf)))
 
 
 def _lobes(shape: mi.Shape) -> int:
     return shape.bsdf().flags() & +mi.BSDFFlags.All
+
+
+def _area(shape: mi.Shape) -> float:
+    return float(np.asarray(shape.surface_area()).ravel()[0])
 
 
 def _plane(shape: Shape) -> tuple[np.ndarray, np.ndarray] | None:

@@ -164,7 +164,7 @@ class MitsubaScene:
 
     def row_of_images(self, shape: mi.UInt32, several: mi.Bool) -> mi.UInt32:
         """Which images are seen in a shape, by its registry index, or in several."""
-        row = dr.gather(mi.UInt32, self._image_rows, shape, shape != 0)
+        row = dr.gather(mi.UInt32, self.image_rows, shape, shape != 0)
         return dr.select(several, self.images.in_several, row)
 
     @cached_property
@@ -176,7 +176,8 @@ class MitsubaScene:
                       {i: names[s.id()] for i, s in shapes.items() if s.id() in names})
 
     @cached_property
-    def _image_rows(self) -> mi.UInt32:
+    def image_rows(self) -> mi.UInt32:
+        """The rows of `images`, by registry index."""
         return aligned(mi.UInt32, self.images.rows)
 
     @cached_property

@@ -83,6 +83,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     from_delta = mi.Bool(True)
     active = mi.Bool(True)
     if dr.hint(behind is not None, mode="scalar"):
+        assert behind is not None
         beta, longest = mi.Color3f(behind.throughput), max_depth - behind.before
 
     split = None
@@ -93,6 +94,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
             smooth &= longest > 1
         split = resample_lights(scene, first, sampler, smooth, lights)
         if dr.hint(behind is not None, mode="scalar"):
+            assert behind is not None
             split = split.through(behind.throughput)
         direct += split.direct
         arrived += split.direct

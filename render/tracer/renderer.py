@@ -109,7 +109,8 @@ class Renderer(View):
             sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
             images, seen, row, behind = self.stage.images, ray, None, None
             if images.any:
-                behind = replaced(scene, ray, pi, sampler, self.scene.max_depth, images.layered)
+                behind = replaced(scene, ray, pi, sampler, self.scene.max_depth,
+                                  self.stage.image_rows, images.layered)
                 seen, pi, row = behind.ray, behind.pi, behind.row(self.stage)
             planes = {}
             if set(channels) & _TRACED:

@@ -41,14 +41,13 @@ from dataclasses import dataclass
 
 import drjit as dr
 
-from onespp.render.mitsuba.images import CLEAR, THROUGH
 from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 
 from .lights.resampling import shape_index
 from .sampler import Sampler
 
-_NOT_CLEAR = +mi.BSDFFlags.All & ~CLEAR
+_THROUGH = +mi.BSDFFlags.DeltaTransmission | +mi.BSDFFlags.Null
 _FARTHEST = 1e7  # times the length along the ray, of images
 _BENDS = 1e-5  # curvature times length, below which a pane leaves things where they are
 
@@ -98,15 +97,15 @@ class Replaced:
 
 @dr.syntax
 def replaced(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
-             max_depth: int, layered: bool) -> Replaced:
+             max_depth: int, rows: mi.UInt32, layered: bool) -> Replaced:
     """The surfaces behind mirrors and glass, of rays and their first hits.
 
     Args:
         sampler: advanced if `layered`. max_depth: longest path in segments, those before the
-            surface included. layered: whether anything in the scene lets light through.
+            surface included. rows, layered: of `Images`.
     """
     reflect, through = mi.BSDFContext(), mi.BSDFContext()
-    reflect.type_mask, through.type_mask = mi.BSDFFlags.DeltaReflection, THROUGH
+    reflect.type_mask, through.type_mask = mi.BSDFFlags.DeltaReflection, _THROUGH
     ray, pi = mi.Ray3f(ray), mi.PreliminaryIntersection3f(pi)
     throughput, before = mi.Color3f(1), mi.UInt32(0)
     images, several = mi.UInt32(0), mi.Bool(False)
@@ -123,13 +122,12 @@ def replaced(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, s
     while dr.hint(active, max_iterations=max_depth, label="images"):
         si = pi.compute_surface_interaction(ray, mi.RayFlags.All | mi.RayFlags.dNSdUV, active)
         bsdf = si.bsdf()
-        lobes = bsdf.flags() & +mi.BSDFFlags.All
-        is_clear = (active & ((lobes & _NOT_CLEAR) == 0) & (lobes != 0)
-                    & ~si.shape.is_emitter())
+        shape = shape_index(pi.shape, active)
+        is_clear = active & (dr.gather(mi.UInt32, rows, shape, active) != 0)
         sample, weight = bsdf.sample(reflect, si, 0.5, mi.Point2f(0.5), is_clear)
         wo, eta, passes = mi.Vector3f(sample.wo), mi.Float(1), mi.Bool(False)
         if dr.hint(layered, mode="scalar"):
-            is_hole = active & ((lobes & +mi.BSDFFlags.Null) != 0)
+            is_hole = active & ~is_clear & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null)
             is_hole &= dr.min(bsdf.eval_null_transmission(si, is_hole)) >= 1
             beyond, share = bsdf.sample(through, si, 0.5, mi.Point2f(0.5), is_clear)
             passes = is_hole | (dr.max(share) > dr.max(weight))
@@ -167,7 +165,6 @@ def replaced(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, s
                 x, y, z = x - 2 * n.x * folded, y - 2 * n.y * folded, z - 2 * n.z * folded
             else:
                 x, y, z = _turned(x, y, z, onward, ray.d)
-            shape = shape_index(pi.shape, active)
             is_image = ~passes | ((eta != 1) & (dr.abs(k) * t > _BENDS))
             several |= is_image & (images != 0) & (images != shape)
             images = dr.select(is_image & (images == 0), shape, images)

@@ -28,7 +28,7 @@ from .things import things
 
 T = TypeVar("T")
 _GOLDEN = (math.sqrt(5) - 1) / 2
-DRAWING = 2
+DRAWING = 3
 """Counts the changes of what is drawn for the same request."""
 _SHADE = diffuse((0.55, 0.55, 0.55))
 """Of lamps, whose backs are seen here: black ones, as `generated/` has, are holes in a picture."""

@@ -26,7 +26,7 @@ def blocks(image: np.ndarray, size: int) -> np.ndarray:
     return whole.reshape(h // size, size, w // size, size, c).mean((1, 3))
 
 
-def assert_same_mean(mean_a, variance_a, mean_b, variance_b=0.0) -> None:
+def assert_same_mean(mean_a, variance_a, mean_b, variance_b: np.ndarray | float = 0.0) -> None:
     """z-test of every component; fails for a difference that chance does not explain."""
     difference = np.asarray(mean_a, np.float64) - mean_b
     deviation = np.sqrt(np.asarray(variance_a, np.float64) + variance_b)

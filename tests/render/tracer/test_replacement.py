@@ -68,7 +68,7 @@ def test_a_flat_mirror_shows_what_would_be_behind_it():
         assert image.sum() > fewest
         assert (behind["id"][image] == scene.object_names.index(name)).all()
         expected = guides_of(behind, image)
-        expected["albedo"] = expected["albedo"] * np.float32((0.9, 0.8, 0.5))
+        expected["albedo"] = expected["albedo"] * np.array((0.9, 0.8, 0.5), np.float32)
         for guide, value in guides_of(frame, image).items():
             np.testing.assert_allclose(value, expected[guide], rtol=2e-3, atol=2e-3, err_msg=guide)
 
@@ -167,8 +167,8 @@ def test_frames_have_the_mean_of_the_reference(name):
                         sampler="zsobol")
     ours = [renderer.frame(4, seed, ("color",))["color"] for seed in range(100)]
     reference = [renderer.sample_sum(4, 9, k, 32) / 32 for k in range(16)]
-    a, b = ([blocks(image, 6) for image in images] for images in (ours, reference))
-    assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
+    a, b = (mean_and_variance([blocks(image, 6) for image in i]) for i in (ours, reference))
+    assert_same_mean(*a, *b)
 
 
 def test_what_glass_reflects_is_specular_light_of_its_own():
