@@ -96,8 +96,8 @@ _ROWS = (
     Channel("indirect", Group.RADIANCE, _rgb("indirect"), FLOAT, Display.LIGHT, 0.0,
             "light scattered twice or more; not demodulated"),
     Channel("albedo", Group.GUIDES, _rgb("albedo"), HALF, Display.LIGHT, 0.0,
-            "diffuse reflectance in [0, 1], less what mirrors and glass before the surface take; 1 where "
-            "there is no diffuse part"),
+            "diffuse reflectance in [0, 1], less what mirrors and glass before the surface take; 1 "
+            "where there is no diffuse part"),
     Channel("normal", Group.GUIDES, ("N.X", "N.Y", "N.Z"), FLOAT, Display.AXES, 0.0,
             "shading normal, normal and bump maps included, world space, unit length, facing the "
             "camera"),
@@ -107,8 +107,8 @@ _ROWS = (
     Channel("depth", Group.GUIDES, ("Z",), EXACT, Display.RANGE, 0.0,
             "camera-space z of the first hit (not distance along the ray), scene units, > 0"),
     Channel("id", Group.GUIDES, ("ID",), OBJECT_ID, Display.OBJECT, -1.0,
-            "object ID: rank of the shape's name in sorted order; images in mirrors and bent glass have "
-            "others, see the manifest's `objects`; -1: nothing there"),
+            "object ID: rank of the shape's name in sorted order; images in mirrors and bent glass "
+            "have others, see the manifest's `objects`; -1: nothing there"),
     Channel("unshadowed", Group.SPLIT, _rgb("unshadowed"), FLOAT, Display.LIGHT, 0.0,
             "direct light as if nothing cast a shadow, noise-free (`--direct resampled` only)"),
     Channel("visibility", Group.SPLIT, ("visibility",), FLOAT, Display.UNIT, 0.0,
