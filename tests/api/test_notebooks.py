@@ -61,6 +61,7 @@ def test_first_steps(run):
     assert any("((96, 128, 3), np.True_)" in text for text in outputs(notebook, "text/plain"))
 
 
+@pytest.mark.slow
 def test_a_filter_of_ones_own(run):
     notebook = run("own_filter")
     table = next(text for text in outputs(notebook, "text/html") if "<table>" in text)

@@ -180,7 +180,8 @@ def test_another_sequence_is_not_overwritten_unasked(call, scene_file, tmp_path)
     assert (out / "frames/0000.exr").read_bytes() != before
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("how", [
+    signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_a_stopped_render_ends_in_a_sentence_and_goes_on_to_the_same_bytes(
         how, call, scene_file, tmp_path):
     arguments = ["render", str(scene_file), "--frames", "0:20", "--size", "48x48",

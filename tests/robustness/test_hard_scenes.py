@@ -270,6 +270,7 @@ def test_rows_say_what_history_costs_and_when_it_is_made_good():
     assert text.count("\n| cut |") == 4
 
 
+@pytest.mark.slow
 def test_the_command_renders_judges_and_prints_every_method(call, monkeypatch, tmp_path):
     small = replace(HARD["switched-on"].make(), width=WIDTH, height=HEIGHT, frames=6)
     monkeypatch.setattr("onespp.scenes.hard.HARD", {"switched-on": replace(HARD["switched-on"],
@@ -279,6 +280,9 @@ def test_the_command_renders_judges_and_prints_every_method(call, monkeypatch, t
     for name in (INPUT, *METHODS):
         assert f" {name} " in out.splitlines()[0]
     assert (tmp_path / "switched-on" / "reference" / "0005.exr").exists()
+
+
+def test_a_hard_scene_that_is_not_there_is_named(call, tmp_path):
     code, _, err = call("hard", "swiched-on", "--out", tmp_path)
     assert code == 2
     assert "did you mean 'hard/switched-on'" in err

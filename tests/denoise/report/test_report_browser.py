@@ -166,16 +166,15 @@ def test_frame_and_method_change_by_menu_and_key(opened, report):
     assert page.locator("#handle").is_hidden()
 
 
-@pytest.mark.parametrize("channel", ["error", "flip", "albedo", "normal", "position", "depth",
-                                     "id"])
-def test_every_channel_is_shown(opened, channel):
+def test_every_channel_is_shown(opened):
     page = opened("#frame=1&a=rough&b=rough")
     before = colour_at(page, 0.4, 0.5)
-    page.select_option("#ca", channel)
-    page.wait_for_selector(READY)
-    assert page.locator("#trouble-a").inner_text() == ""
-    assert colour_at(page, 0.4, 0.5) != before
-    assert channel in page.locator("#tag-a").inner_text()
+    for channel in ("error", "flip", "albedo", "normal", "position", "depth", "id"):
+        page.select_option("#ca", channel)
+        page.wait_for_selector(READY)
+        assert page.locator("#trouble-a").inner_text() == ""
+        assert colour_at(page, 0.4, 0.5) != before, channel
+        assert channel in page.locator("#tag-a").inner_text()
 
 
 def test_the_pixel_under_the_pointer_is_read_out(opened, report):

@@ -88,8 +88,9 @@ def spoiled(tmp_path, module: str, code: str) -> str:
                  "BAD   OpenEXR: crashed (SIGSEGV)", marks=pytest.mark.slow),
     pytest.param("matplotlib", "raise ImportError('no such symbol')",
                  "BAD   Matplotlib: ImportError: no such symbol", marks=pytest.mark.slow),
-    ("av", "def open(*_, **__): raise RuntimeError('none for this platform')",
-     "note  PyAV: RuntimeError: none for this platform; movies are left out")])
+    pytest.param("av", "def open(*_, **__): raise RuntimeError('none for this platform')",
+                 "note  PyAV: RuntimeError: none for this platform; movies are left out",
+                 marks=pytest.mark.slow)])
 @pytest.mark.skipif(sys.platform == "win32", reason="no signals to die of")
 def test_doctor_survives_a_library_that_crashes_and_names_it(tmp_path, module, code, words):
     done = onespp("doctor", PYTHONPATH=spoiled(tmp_path, module, code))

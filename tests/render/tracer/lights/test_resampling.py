@@ -27,7 +27,7 @@ def test_unshadowed_light_has_no_noise(name):
     np.testing.assert_allclose(a, b, rtol=1e-5)
 
 
-@pytest.mark.parametrize("name", ["box", "room"])
+@pytest.mark.parametrize("name", ["box", pytest.param("room", marks=pytest.mark.slow)])
 def test_visibility_times_unshadowed_light_has_the_mean_of_direct_light(name):
     renderer = Renderer(catalog.load(name), 32, 48, direct="resampled")
     frames = [renderer.frame(2, seed, ("direct", *SPLIT)) for seed in range(50)]
