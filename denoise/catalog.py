@@ -31,6 +31,7 @@ from onespp.denoise.methods.bilateral import Bilateral
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
 from onespp.denoise.methods.outliers import RemoveOutliers, WithoutOutliers
 from onespp.denoise.methods.parameters import renamed_parameters, with_present_names
+from onespp.denoise.methods.recurrent.rae import Rae
 from onespp.denoise.methods.regression.bmfr import Bmfr
 from onespp.denoise.methods.reliable_motion.trmv import Trmv
 from onespp.denoise.methods.separable import BilateralSeparable
@@ -96,6 +97,7 @@ METHODS: Mapping[str, type] = MappingProxyType({
     "trmv": Trmv,
     "asvgf": Asvgf,
     "bmfr": Bmfr,
+    "rae-quarter": Rae,
     "onespp": FilteredInnovation,
     "onespp-taa": InnovationTaa,
 })

@@ -21,7 +21,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ROOMS = (
     "onespp.__main__", "onespp.cli", "onespp.templates", "onespp.denoise.cli", "onespp.render.cli",
-    "onespp", "onespp.api",
+    "onespp", "onespp.api", "onespp.training",
     "onespp.datasets.pool", "onespp.datasets.preview", "onespp.datasets.making",
     "onespp.datasets.look", "onespp.clips", "onespp.datasets.processes",
     "onespp.datasets",
@@ -29,7 +29,8 @@ ROOMS = (
     "onespp.denoise.run", "onespp.denoise.score",
     "onespp.denoise.catalog", "onespp.denoise.peers",
     "onespp.denoise.methods.antialiasing", "onespp.denoise.methods.filtered_innovation",
-    "onespp.denoise.methods.regression", "onespp.denoise.methods.reliable_motion",
+    "onespp.denoise.methods.recurrent", "onespp.denoise.methods.regression",
+    "onespp.denoise.methods.reliable_motion",
     "onespp.denoise.methods.unguided",
     "onespp.denoise.methods",
     "onespp.denoise.filters", "onespp.denoise.history", "onespp.denoise.inputs",
@@ -55,7 +56,7 @@ ONLY_IN = {  # package -> rooms that may import it
     "click": r"\.cli(\.|$)",
     # trials: what `doctor` tries
     **dict.fromkeys(("matplotlib", "PIL", "jinja2", "av"),
-                    r"\.denoise\.report(\.|$)|\.render\.trials$"),
+                    r"\.denoise\.report(\.|$)|\.render\.trials$|\.training\.curve$"),
     "mitsuba": r"\.render\.(study|tracer|gltf|scene_files|mitsuba|cli|doctor|trials)(\.|$)|"
                r"\.denoise\.peers\.optix$",
 }
@@ -175,7 +176,7 @@ def test_a_broken_rule_is_noticed(module: str, line: str, complaint: str):
 
 def test_a_folder_holds_3_to_12_files():
     folders = {path.parent for top in ("scenes", "render", "denoise", "onespp/api", "onespp/show",
-                                             "onespp/datasets", "onespp/clips")
+                                             "onespp/datasets", "onespp/clips", "onespp/training")
                for path in (ROOT / top).rglob("*.py")}
     sizes = {str(folder.relative_to(ROOT)): len([
         p for p in folder.iterdir() if p.suffix == ".py" and p.stem != "__init__"])
