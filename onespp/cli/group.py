@@ -27,6 +27,7 @@ from .lead import lead
 from .new import new
 from .run import run
 from .scenes import scenes
+from .train import train
 
 EXIT_CODES = {
     "": "Exit codes: 0 done, 2 bad input or a machine that lacks something, 130 interrupted.",
@@ -42,11 +43,11 @@ def app() -> None:
 
 
 for command in (scenes, render, denoise, time_, score, run, report, view, compare, bench, tune,
-                ablate, lead, truth, hard, dataset, import_, check, export, new, doctor,
+                ablate, lead, truth, hard, dataset, train, import_, check, export, new, doctor,
                 completion):
     command.epilog = EXIT_CODES.get(command.name or "", EXIT_CODES[""])
     app.add_command(command)
-for command in bench.commands.values():
+for command in (*bench.commands.values(), *train.commands.values()):
     command.epilog = EXIT_CODES[""]
 
 

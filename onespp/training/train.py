@@ -1,0 +1,224 @@
+"""The steps of a training, which goes on where it was stopped, to the same weights.
+
+Adam with beta 0.9 and 0.99. The rate grows to 1e-3 tenfold in a geometric progression over the
+first 200 steps (the paper: over 10 of 500 epochs) and falls with 1 / sqrt(step) after them. It does
+not depend on how many steps there are to be, so that a training can be gone on with. Batches follow
+from the seed and the step, checkpoints hold all else.
+"""
+
+# pyright: standard, reportMissingImports=false
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from onespp.denoise.methods.recurrent.architecture import WIDTHS, begun
+from onespp.denoise.methods.recurrent.weights import Network, write_network
+from onespp.render.errors import InputError
+from onespp.render.files.atomic import write_text
+from onespp.render.host.versions import versions
+from onespp.render.progress import Progress, silent
+
+from .batches import Batches
+from .checkpoint import Checkpoint
+
+RATE, RAMP = 1e-3, 200
+_SHOWN = 50  # steps whose mean loss is shown
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the weights after a step depend on, beside the data.
+
+    Attributes:
+        width: of `WIDTHS`. seed: of the first weights and all batches. batch: clips a step.
+        crop: side of a clip, pixels.
+    """
+
+    width: str = "quarter"
+    seed: int = 0
+    batch: int = 4
+    crop: int = 128
+
+    def __post_init__(self) -> None:
+        if self.width not in WIDTHS:
+            raise InputError(f"--width is {self.width}: use {', '.join(WIDTHS)}")
+        if self.batch < 1:
+            raise InputError(f"--batch is {self.batch}: use 1 or more")
+        if self.seed < 0:
+            raise InputError(f"--seed is {self.seed}: use 0 or more")
+
+
+def require_jax() -> None:
+    """InputError where JAX or Optax are not installed."""
+    missing = [name for name in ("jax", "optax") if find_spec(name) is None]
+    if missing:
+        raise InputError(f"training needs {' and '.join(missing)}: run "
+                         "`pip install 'onespp[train]'`")
+
+
+def rate_of(step: int) -> float:
+    """Of step 0, 1, ..."""
+    return RATE * (10.0 ** (step / RAMP - 1) if step < RAMP else (RAMP / (step + 1)) ** 0.5)
+
+
+def train(folder: Path, out: Path, steps: int, settings: Settings, every: int = 100,
+          cache: Path | None = None, progress: Progress = silent) -> Checkpoint:
+    """Train to so many steps, from the checkpoint beside `out` if there is one; write `out`, its
+    log (.json), and the checkpoint.
+
+    Args:
+        every: steps between checkpoints. cache: folder for memory maps of frames.
+
+    Raises:
+        InputError: no JAX, a data set that may not or cannot be used, a checkpoint of other
+            settings, or a disk that refuses.
+        KeyboardInterrupt: from `progress`; the checkpoint is written first.
+    """
+    require_jax()
+    for name, value in (("--steps", steps), ("--checkpoint", every)):
+        if value < 1:
+            raise InputError(f"{name} is {value}: use 1 or more")
+    batches = Batches.of(folder, settings.crop, settings.batch, settings.seed, cache)
+    others = _validation(folder, settings, cache)
+    known = {**asdict(settings), "data": batches.digest}
+    path = checkpoint_of(out)
+    optimizer = _Optimizer(settings)
+    stand = (Checkpoint.read(path, known) if path.exists()
+             else Checkpoint(known, optimizer.arrays()))
+    done = len(stand.losses)
+    if done > steps:
+        raise InputError(f"{path} has {done} steps already: use --steps {done} or more, or another "
+                         "--out")
+    optimizer.load(stand.arrays)
+    name = f"train rae-{settings.width}"
+
+    def save() -> None:
+        stand.arrays = optimizer.arrays()
+        stand.write(path)
+
+    with _in_turn(batches, done, steps) as queue:
+        for step, batch in queue:
+            begun_at = time.perf_counter()
+            stand.losses.append(optimizer.step(step, *batch))
+            stand.seconds += time.perf_counter() - begun_at
+            last = step + 1 == steps
+            if last or (step + 1) % every == 0:
+                if others:
+                    stand.validation[step + 1] = optimizer.loss(*others)
+                save()
+            try:
+                progress(step + 1, steps, name, f"loss {np.mean(stand.losses[-_SHOWN:]):.4f}")
+            except KeyboardInterrupt:
+                save()
+                raise
+    _write(out, stand, optimizer, settings, batches)
+    return stand
+
+
+def checkpoint_of(out: Path) -> Path:
+    """Where the checkpoint of a file of weights is."""
+    return out.with_suffix(".checkpoint.npz")
+
+
+def log_of(out: Path) -> Path:
+    """Where the losses of a training are."""
+    return out.with_suffix(".json")
+
+
+def _write(out: Path, stand: Checkpoint, optimizer: _Optimizer, settings: Settings,
+           batches: Batches) -> None:
+    plan = batches.clips.plan
+    about = {**asdict(settings), "steps": len(stand.losses),
+             "data": {"name": plan.name, "seed": plan.seed, "digest": batches.digest,
+                      "sequences": len(batches.clips.numbers)},
+             "versions": versions("jax", "optax", "numpy")}
+    del about["width"]
+    write_network(out, Network(settings.width, optimizer.weights(), about))
+    log = {**about, "width": settings.width, "seconds": round(stand.seconds, 1),
+           "loss": [round(x, 6) for x in stand.losses],
+           "validation": {str(k): round(v, 6) for k, v in stand.validation.items()}}
+    write_text(log_of(out), json.dumps(log, indent=1) + "\n")
+
+
+def _validation(folder: Path, settings: Settings,
+                cache: Path | None) -> tuple[np.ndarray, np.ndarray] | None:
+    """A batch of scenes that are not trained on; None where the data set has none."""
+    try:
+        batches = Batches.of(folder, settings.crop, settings.batch, settings.seed, cache,
+                             "validation", augment=False)
+    except InputError:
+        return None
+    return batches.read(0)
+
+
+@contextmanager
+def _in_turn(batches: Batches, first: int, end: int) -> Iterator[Iterator[tuple[int, tuple]]]:
+    """Yields (step, batch), each read while the one before it is worked on."""
+    with ThreadPoolExecutor(1) as reader:
+        def listed() -> Iterator[tuple[int, tuple]]:
+            ahead = reader.submit(batches.read, first) if first < end else None
+            for step in range(first, end):
+                assert ahead is not None
+                batch = ahead.result()
+                if step + 1 < end:
+                    ahead = reader.submit(batches.read, step + 1)
+                yield step, batch
+
+        yield listed()
+
+
+class _Optimizer:
+    """Weights and Adam's moments, and the compiled step."""
+
+    def __init__(self, settings: Settings) -> None:
+        import jax
+        import optax
+
+        from .loss import loss
+        from .network import forward
+
+        def of(weights: Any, planes: Any, truth: Any) -> Any:
+            return loss(forward(weights, planes), truth)
+
+        def update(weights: Any, moments: Any, rate: Any, planes: Any, truth: Any) -> tuple:
+            value, slope = jax.value_and_grad(of)(weights, planes, truth)
+            change, moments = adam.update(slope, moments)
+            weights = jax.tree.map(lambda w, c: w - rate * c, weights, change)
+            return weights, moments, value
+
+        adam = optax.scale_by_adam(b1=0.9, b2=0.99)
+        self._jax, self._update, self._loss = jax, jax.jit(update), jax.jit(of)
+        self._weights: Any = begun(settings.width, settings.seed)
+        self._moments: Any = adam.init(self._weights)
+
+    def step(self, step: int, planes: np.ndarray, truth: np.ndarray) -> float:
+        """Its loss, before the change."""
+        self._weights, self._moments, value = self._update(
+            self._weights, self._moments, np.float32(rate_of(step)), planes, truth)
+        return float(value)
+
+    def loss(self, planes: np.ndarray, truth: np.ndarray) -> float:
+        return float(self._loss(self._weights, planes, truth))
+
+    def weights(self) -> dict[str, np.ndarray]:
+        return {name: np.asarray(array) for name, array in self._weights.items()}
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """All of it; see `load`."""
+        leaves = self._jax.tree.leaves(self._moments)
+        return {**self.weights(), **{f"adam{i}": np.asarray(x) for i, x in enumerate(leaves)}}
+
+    def load(self, arrays: dict[str, np.ndarray]) -> None:
+        leaves, form = self._jax.tree.flatten(self._moments)
+        self._moments = form.unflatten([arrays[f"adam{i}"] for i in range(len(leaves))])
+        self._weights = {name: arrays[name] for name in self._weights}
