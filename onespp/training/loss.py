@@ -8,8 +8,9 @@ of the clip. Mean over pixels and components of
 and over frames, weighted by `FRAME_WEIGHTS`: what comes late in a clip has a history to use. LoG is
 a Gaussian of 1.5 pixels in seven taps along rows and columns, and the Laplacian of its result.
 
-Source: Chaitanya et al. 2017, section 4; see `rae.py` for what is compressed how. Departure: the
-image is mirrored at its border for the Gaussian.
+Source: Chaitanya et al. 2017, section 4: the shares, the sigma and the frame weights. Departures:
+light is compressed by g and not by the power 0.2 (see `rae.py`); the frame weights are divided by
+their sum; the image is mirrored at its border for the Gaussian.
 """
 
 # pyright: standard, reportMissingImports=false

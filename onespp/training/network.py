@@ -58,9 +58,15 @@ def _convolved(weights: Parameters, name: str, x: Array) -> Array:
 def _pooled(x: Array) -> Array:
     b, h, w, c = x.shape
     x = x.reshape(b, h // 2, 2, w // 2, 2, c)
-    x = jnp.maximum(x[:, :, 0], x[:, :, 1])
-    return jnp.maximum(x[:, :, :, 0], x[:, :, :, 1])
+    x = _greater(x[:, :, 0], x[:, :, 1])
+    return _greater(x[:, :, :, 0], x[:, :, :, 1])
 
 
 def _leaky(x: Array) -> Array:
-    return jnp.maximum(x, SLOPE * x)
+    return jnp.where(x > 0, x, SLOPE * x)
+
+
+def _greater(a: Array, b: Array) -> Array:
+    """Its slope, and that of the rectifier, is one choice: with `jnp.maximum` in both, which halves
+    it between equal ones, a step takes a fifth longer."""
+    return jnp.where(a >= b, a, b)

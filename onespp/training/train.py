@@ -1,9 +1,19 @@
 """The steps of a training, which goes on where it was stopped, to the same weights.
 
-Adam with beta 0.9 and 0.99. The rate grows to 1e-3 tenfold in a geometric progression over the
-first 200 steps (the paper: over 10 of 500 epochs) and falls with 1 / sqrt(step) after them. It does
-not depend on how many steps there are to be, so that a training can be gone on with. Batches follow
-from the seed and the step, checkpoints hold all else.
+Adam with beta 0.9 and 0.99. The rate grows to `RATE` tenfold in a geometric progression over the
+first `RAMP` steps (the paper: over 10 of 500 epochs) and falls with 1 / sqrt(step) after them. What
+is written and validated is a mean over the steps t, in which late ones count more: with weights w,
+
+    mean += 9 / (t + 8) (w - mean)
+
+which does what a rate that falls to 0 at the end would do, and knows of no end. So nothing depends
+on how many steps there are to be: a training may be stopped at any of them, and gone on with.
+Batches follow from the seed and the step, checkpoints hold all else.
+
+Source of the mean: Shamir and Zhang 2013, "Stochastic gradient descent for non-smooth
+optimization", with eta = 8. Of the optimizer: Chaitanya et al. 2017, section 4. Departures: the
+mean; a ramp counted in steps; a gradient (of all weights, as one vector) longer than `LONGEST` is
+scaled to it, or else one clip with a firefly would shorten the next hundred steps.
 """
 
 # pyright: standard, reportMissingImports=false
@@ -21,7 +31,7 @@ from typing import Any
 
 import numpy as np
 
-from onespp.denoise.methods.recurrent.architecture import WIDTHS, begun
+from onespp.denoise.methods.recurrent.architecture import WIDTHS, Weights, begun
 from onespp.denoise.methods.recurrent.weights import Network, write_network
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
@@ -31,7 +41,8 @@ from onespp.render.progress import Progress, silent
 from .batches import Batches
 from .checkpoint import Checkpoint
 
-RATE, RAMP = 1e-3, 200
+RATE, RAMP, LONGEST = 1e-3, 50, 1.0
+RULES = 2  # by which steps are made: changes with whatever changes the weights of a seed
 _SHOWN = 50  # steps whose mean loss is shown
 
 
@@ -71,18 +82,24 @@ def rate_of(step: int) -> float:
     return RATE * (10.0 ** (step / RAMP - 1) if step < RAMP else (RAMP / (step + 1)) ** 0.5)
 
 
+def share_of(step: int) -> float:
+    """Of the weights after step 0, 1, ... in the mean."""
+    return 9 / (step + 9)
+
+
 def train(folder: Path, out: Path, steps: int, settings: Settings, every: int = 100,
           cache: Path | None = None, progress: Progress = silent) -> Checkpoint:
-    """Train to so many steps, from the checkpoint beside `out` if there is one; write `out`, its
-    log (.json), and the checkpoint.
+    """Train to so many steps, from the checkpoint beside `out` if there is one.
+
+    With each checkpoint `out` is written and its log (.json).
 
     Args:
         every: steps between checkpoints. cache: folder for memory maps of frames.
 
     Raises:
         InputError: no JAX, a data set that may not or cannot be used, a checkpoint of other
-            settings, or a disk that refuses.
-        KeyboardInterrupt: from `progress`; the checkpoint is written first.
+            settings, a loss that is no number, or a disk that refuses.
+        KeyboardInterrupt: from `progress`; a checkpoint is written first.
     """
     require_jax()
     for name, value in (("--steps", steps), ("--checkpoint", every)):
@@ -90,7 +107,7 @@ def train(folder: Path, out: Path, steps: int, settings: Settings, every: int = 
             raise InputError(f"{name} is {value}: use 1 or more")
     batches = Batches.of(folder, settings.crop, settings.batch, settings.seed, cache)
     others = _validation(folder, settings, cache)
-    known = {**asdict(settings), "data": batches.digest}
+    known = {**asdict(settings), "data": batches.digest, "rules": RULES}
     path = checkpoint_of(out)
     optimizer = _Optimizer(settings)
     stand = (Checkpoint.read(path, known) if path.exists()
@@ -105,14 +122,18 @@ def train(folder: Path, out: Path, steps: int, settings: Settings, every: int = 
     def save() -> None:
         stand.arrays = optimizer.arrays()
         stand.write(path)
+        _write(out, stand, optimizer.weights(), settings, batches)
 
     with _in_turn(batches, done, steps) as queue:
         for step, batch in queue:
             begun_at = time.perf_counter()
-            stand.losses.append(optimizer.step(step, *batch))
+            loss = optimizer.step(step, *batch)
+            if not np.isfinite(loss):
+                raise InputError(f"the loss of step {step + 1} is {loss}: look for frames of "
+                                 f"{folder} that are not finite (`onespp check`)")
+            stand.losses.append(loss)
             stand.seconds += time.perf_counter() - begun_at
-            last = step + 1 == steps
-            if last or (step + 1) % every == 0:
+            if step + 1 == steps or (step + 1) % every == 0:
                 if others:
                     stand.validation[step + 1] = optimizer.loss(*others)
                 save()
@@ -121,7 +142,8 @@ def train(folder: Path, out: Path, steps: int, settings: Settings, every: int = 
             except KeyboardInterrupt:
                 save()
                 raise
-    _write(out, stand, optimizer, settings, batches)
+    if done == steps:
+        save()
     return stand
 
 
@@ -135,7 +157,7 @@ def log_of(out: Path) -> Path:
     return out.with_suffix(".json")
 
 
-def _write(out: Path, stand: Checkpoint, optimizer: _Optimizer, settings: Settings,
+def _write(out: Path, stand: Checkpoint, weights: Weights, settings: Settings,
            batches: Batches) -> None:
     plan = batches.clips.plan
     about = {**asdict(settings), "steps": len(stand.losses),
@@ -143,7 +165,7 @@ def _write(out: Path, stand: Checkpoint, optimizer: _Optimizer, settings: Settin
                       "sequences": len(batches.clips.numbers)},
              "versions": versions("jax", "optax", "numpy")}
     del about["width"]
-    write_network(out, Network(settings.width, optimizer.weights(), about))
+    write_network(out, Network(settings.width, weights, about))
     log = {**about, "width": settings.width, "seconds": round(stand.seconds, 1),
            "loss": [round(x, 6) for x in stand.losses],
            "validation": {str(k): round(v, 6) for k, v in stand.validation.items()}}
@@ -178,7 +200,7 @@ def _in_turn(batches: Batches, first: int, end: int) -> Iterator[Iterator[tuple[
 
 
 class _Optimizer:
-    """Weights and Adam's moments, and the compiled step."""
+    """Weights, their mean over the steps, and Adam's moments; and the compiled step."""
 
     def __init__(self, settings: Settings) -> None:
         import jax
@@ -190,35 +212,45 @@ class _Optimizer:
         def of(weights: Any, planes: Any, truth: Any) -> Any:
             return loss(forward(weights, planes), truth)
 
-        def update(weights: Any, moments: Any, rate: Any, planes: Any, truth: Any) -> tuple:
+        def update(weights: Any, mean: Any, moments: Any, rate: Any, share: Any, planes: Any,
+                   truth: Any) -> tuple:
             value, slope = jax.value_and_grad(of)(weights, planes, truth)
             change, moments = adam.update(slope, moments)
             weights = jax.tree.map(lambda w, c: w - rate * c, weights, change)
-            return weights, moments, value
+            mean = jax.tree.map(lambda m, w: m + share * (w - m), mean, weights)
+            return weights, mean, moments, value
 
-        adam = optax.scale_by_adam(b1=0.9, b2=0.99)
+        adam = optax.chain(optax.clip_by_global_norm(LONGEST),
+                           optax.scale_by_adam(b1=0.9, b2=0.99))
         self._jax, self._update, self._loss = jax, jax.jit(update), jax.jit(of)
         self._weights: Any = begun(settings.width, settings.seed)
+        self._mean: Any = self._weights
         self._moments: Any = adam.init(self._weights)
 
     def step(self, step: int, planes: np.ndarray, truth: np.ndarray) -> float:
         """Its loss, before the change."""
-        self._weights, self._moments, value = self._update(
-            self._weights, self._moments, np.float32(rate_of(step)), planes, truth)
+        self._weights, self._mean, self._moments, value = self._update(
+            self._weights, self._mean, self._moments, np.float32(rate_of(step)),
+            np.float32(share_of(step)), planes, truth)
         return float(value)
 
     def loss(self, planes: np.ndarray, truth: np.ndarray) -> float:
-        return float(self._loss(self._weights, planes, truth))
+        """Of the mean."""
+        return float(self._loss(self._mean, planes, truth))
 
-    def weights(self) -> dict[str, np.ndarray]:
-        return {name: np.asarray(array) for name, array in self._weights.items()}
+    def weights(self) -> Weights:
+        """The mean."""
+        return {name: np.asarray(array) for name, array in self._mean.items()}
 
     def arrays(self) -> dict[str, np.ndarray]:
         """All of it; see `load`."""
         leaves = self._jax.tree.leaves(self._moments)
-        return {**self.weights(), **{f"adam{i}": np.asarray(x) for i, x in enumerate(leaves)}}
+        return {**{name: np.asarray(array) for name, array in self._weights.items()},
+                **{f"mean/{name}": array for name, array in self.weights().items()},
+                **{f"adam{i}": np.asarray(x) for i, x in enumerate(leaves)}}
 
     def load(self, arrays: dict[str, np.ndarray]) -> None:
         leaves, form = self._jax.tree.flatten(self._moments)
         self._moments = form.unflatten([arrays[f"adam{i}"] for i in range(len(leaves))])
-        self._weights = {name: arrays[name] for name in self._weights}
+        self._weights, self._mean = ({name: arrays[f"{kind}{name}"] for name in self._weights}
+                                     for kind in ("", "mean/"))

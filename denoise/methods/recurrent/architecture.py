@@ -74,9 +74,12 @@ def shapes(width: str) -> dict[str, tuple[int, ...]]:
 
 
 def begun(width: str, seed: int) -> Weights:
-    """Weights before training: normal, of He's variance for the rectifier; biases 0. float32."""
+    """Weights before training: normal, of He's variance for the rectifier, a hundredth of it in the
+    last layer, so that training does not begin with unlearning an image; biases 0. float32."""
     random, found = np.random.default_rng(seed), {}
     for name, shape in shapes(width).items():
         gain = 2 / (1 + SLOPE**2) / np.prod(shape[:3]) if len(shape) == 4 else 0.0
+        if name == "up0.out":
+            gain /= 100
         found[name] = np.float32(np.sqrt(gain)) * random.standard_normal(shape, np.float32)
     return found

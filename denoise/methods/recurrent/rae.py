@@ -11,8 +11,8 @@ frame's surfaces; input and result are planes of
 
 Source: Chaitanya et al. 2017, "Interactive Reconstruction of Monte Carlo Image Sequences using a
 Recurrent Denoising Autoencoder", doi:10.1145/3072959.3073601. The weights are ours: a network with
-a quarter of the published features, trained by `onespp train rae` for minutes on two cores, where
-the paper's was trained for days on a GPU. What it scores says nothing about the paper's.
+a quarter of the published features, trained by `onespp train rae` on two cores, for minutes. What
+it scores says nothing about the paper's.
 
 Departures:
 - Light is compressed by g, in the input, the result and the loss. The paper has a loss on L^0.2,
@@ -58,7 +58,7 @@ _LARGEST = 50.0  # of g's logarithm: a result beyond it would overflow
 @dataclass(frozen=True)
 class Rae(OnLanes["RaeState"]):
     """rae-quarter (ours): a recurrent autoencoder of a quarter of the published width, at the
-    beginning of its training; its errors look worse than the input's noise so far.
+    beginning of its training: blotches, fringes and guessed shadows instead of noise.
 
     Attributes:
         weights: file that `onespp train rae` wrote, of any width; empty: those that come along.

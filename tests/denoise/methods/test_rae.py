@@ -80,7 +80,7 @@ def test_the_network_of_kernels_agrees_before_anything_holds_its_result(weights_
 
 def test_what_is_trained_is_what_denoises(weights_file, frames):
     """JAX's forward pass against the formula, which kernels agree with."""
-    jax = pytest.importorskip("jax")
+    jax = pytest.importorskip("jax", reason="JAX is not installed: pip install 'onespp[train]'")
     from onespp.training.network import forward
 
     weights, planes = read_network(weights_file).weights, planes_of(frames[:2])
