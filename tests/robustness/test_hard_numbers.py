@@ -95,7 +95,8 @@ def test_a_bad_pixel_stays_one_its_neighbours_are_as_if_it_were_missing(name):
         np.testing.assert_array_equal(again, images)
 
 
-@pytest.mark.parametrize("name", [n for n in METHODS if n != "rae-quarter"])  # sees all of it
+# A network sees all of an image this small, by its coarsest level and what is around there.
+@pytest.mark.parametrize("name", [n for n in METHODS if n != "rae-quarter"])
 def test_a_bad_pixel_changes_nothing_out_of_reach(name):
     frames = [noisy(make_frame(24, 40, index=i, wall_end=1e9), seed=i) for i in range(2)]
     good = history(name, frames, levels=1)[-1]
