@@ -57,7 +57,7 @@ def test_what_cannot_be_trained_on_is_refused(made, tmp_path, monkeypatch):
     for options, words in (({"width": "wide"}, "--width is wide: use full"),
                            ({"batch": 0}, "--batch is 0"), ({"seed": -1}, "--seed is -1")):
         with pytest.raises(InputError, match=words):
-            training.Settings(**options)
+            training.Settings(**options)  # type: ignore[arg-type]
     monkeypatch.setattr(training, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"jax and optax: run `pip install 'onespp\[train\]'`"):
         training.train(made.folder, tmp_path / "x.npz", 1, training.Settings())

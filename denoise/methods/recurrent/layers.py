@@ -10,6 +10,8 @@ for each of them.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 import drjit as dr
 import drjit.nn as nn
@@ -44,7 +46,7 @@ class Convolution:
         matrix = np.ascontiguousarray(weights.reshape(-1, outputs).T, np.float32)
         return Convolution(
             planes, planes.taps(_TAPS), stencil.table(matrix.reshape(-1)), stencil.table(bias),
-            Step(lambda *a: convolve(*a, (outputs, 9 * inputs), is_linear)))
+            Step(partial(convolve, shape=(outputs, 9 * inputs), is_linear=is_linear)))
 
     def __call__(self, *features: list[Float]) -> list[Float]:
         """Of evaluated features, which are put beside each other."""
@@ -59,7 +61,8 @@ def convolve(taps: Taps[list[Float]], matrix: Float, bias: Float, shape: tuple[i
              is_linear: bool) -> list[Float]:
     """One output a row of the matrix."""
     around = [x for t in range(len(taps)) for x in taps.at(t)]
-    rows = nn.view(dr.tensor_t(type(matrix))(matrix, shape))
+    tensor: Any = dr.tensor_t(type(matrix))
+    rows = nn.view(tensor(matrix, shape))
     found = [*nn.matvec(rows, nn.CoopVec(*around), nn.view(bias))]
     if not is_linear:
         found = [dr.maximum(x, SLOPE * x) for x in found]

@@ -67,7 +67,7 @@ def test_agrees_with_the_formula_in_float64(weights_file, frames):
 
 def test_the_network_of_kernels_agrees_before_anything_holds_its_result(weights_file, frames):
     network, planes = read_network(weights_file), planes_of(frames)
-    stencil = Stencil(*planes.shape[1:3], 1)
+    stencil = Stencil(planes.shape[1], planes.shape[2], 1)
     autoencoder, memory, images = Autoencoder.make(stencil, network), [], []
     for image in planes.astype(np.float32):
         lanes = [x + 0 for x in stencil.load(image)]
