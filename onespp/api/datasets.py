@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from onespp.datasets.files import opened
 from onespp.datasets.folder import DataSet
 from onespp.datasets.making import make_all
 from onespp.datasets.plan import Plan, changed_plan, read_plan
@@ -68,8 +69,9 @@ def dataset(plan: str | Path | Plan, out: Path | str, *, sequences: int | None =
     if dask is None:
         with turn():
             import onespp.datasets.look  # noqa: F401  # imports Mitsuba
-    data = DataSet.create(out, made, versions("mitsuba", "drjit", "numpy"))
     who = caller()
+    made = opened(made, who.inform)
+    data = DataSet.create(out, made, versions("mitsuba", "drjit", "numpy"))
     try:
         with who.progress() as report:
             if dask is None:
@@ -98,6 +100,7 @@ def preview(plan: str | Path | Plan, count: int, out: Path, **options: Any) -> l
     made = planned(plan, **options)
     if not 1 <= count <= 400:
         raise InputError(f"--preview is {count}: use 1 to 400")
+    made = opened(made, caller().inform)
     with turn():
         from onespp.datasets.preview import preview as drawn  # imports Mitsuba
     from onespp.show.png import png

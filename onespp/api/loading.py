@@ -8,13 +8,11 @@ from pathlib import Path
 
 from onespp.render.errors import InputError
 from onespp.render.host.turns import turn
-from onespp.render.scene_files.loaded import Loaded
+from onespp.render.scene_of_file import XML, is_scene_file, scene_of_file
 from onespp.scenes import catalog
 from onespp.scenes.description import Scene, SceneError
 
 from .caller import caller, public
-
-_XML, _GLTF = ".xml", (".glb", ".gltf")
 
 
 @public
@@ -45,32 +43,20 @@ def load(scene: str | Path | Scene, *, define: Mapping[str, object] | None = Non
     if not isinstance(scene, str | Path):
         raise SceneError(f"a scene is a {type(scene).__name__}: use a name of onespp.scenes(), the "
                          "path of a .py, .xml, .glb or .gltf file, or a onespp.Scene")
-    kind = str(scene).lower()
-    if define and not kind.endswith(_XML):
+    if define and not str(scene).lower().endswith(XML):
         raise InputError(f"-D is for Mitsuba's XML files, and '{scene}' is none: leave it out")
-    if not kind.endswith((_XML, *_GLTF)):
+    if not is_scene_file(scene):
         if sensor:
             raise InputError(f"--sensor is for files of Mitsuba and of glTF, and '{scene}' is "
                              "none: leave it out")
         return catalog.load(str(scene))
-    with turn():
-        loaded = _of_file(Path(scene), kind, define or {}, sensor)
+    texts = {str(name): _text(value) for name, value in (define or {}).items()}
+    loaded = scene_of_file(Path(scene), texts, sensor)
     if loaded.added:
         caller().inform(loaded.added)
     if loaded.unused:
         caller().inform(f"of {Path(scene).name} is not used: {loaded.unused}")
     return loaded.scene
-
-
-def _of_file(path: Path, kind: str, define: Mapping[str, object], sensor: int) -> Loaded:
-    """The scene of another program's file; imports Mitsuba."""
-    if kind.endswith(_XML):
-        from onespp.render.scene_files.mitsuba_xml import load_xml
-
-        return load_xml(path, {str(name): _text(value) for name, value in define.items()}, sensor)
-    from onespp.render.gltf.gltf import load_gltf
-
-    return load_gltf(path, sensor)
 
 
 @public

@@ -63,6 +63,8 @@ def _counts(draws: Mapping[int, Mapping[str, Any]]) -> list[tuple[str, Counter[s
     things = [thing for draw in found for thing in draw["things"]]
     return [*((title, Counter(str(draw[key]) for draw in found)) for title, key in (
         ("families", "family"), ("lights", "light"), ("cameras", "camera"))),
+        *((title, counts) for title, counts in [("files", Counter(
+            str(draw["file"]) for draw in found if "file" in draw))] if counts),
         *((title, Counter(str(thing[key]) for thing in things)) for title, key in (
             ("objects", "object"), ("materials", "material"), ("motions", "motion")))]
 

@@ -6,6 +6,7 @@ Nothing here renders: data loaders read it (`onespp/clips/`).
 from __future__ import annotations
 
 import hashlib
+import os
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
@@ -128,7 +129,7 @@ class DataSet:
         if not path.exists():
             raise InputError(f"{folder} is not a data set (it has no dataset.json): make one with "
                              "`onespp dataset`")
-        return cls(Path(folder), read_json(path, DataSetFile).plan)
+        return cls(Path(folder), _plan_in(Path(folder), read_json(path, DataSetFile).plan))
 
     @classmethod
     def create(cls, folder: Path | str, plan: Plan, versions: Mapping[str, str]) -> DataSet:
@@ -144,19 +145,23 @@ class DataSet:
             if path.exists():
                 there = read_json(path, DataSetFile)
                 if there.plan.key != plan.key:
+                    _require_same_files(folder, there.plan, plan)
                     raise InputError(f"{folder} holds a data set of another plan "
                                      f"({_difference(there.plan, plan)}): use another --out")
                 if there.drawing != DRAWING:
                     raise InputError(f"{folder} has scenes that another version of onespp drew, "
                                      "and this one draws others: use another --out")
                 if there.plan.sequences >= plan.sequences:
-                    return cls(folder, there.plan)
-                written = there.model_copy(update={"plan": plan})
+                    plan = there.plan.model_copy(update={"folder": plan.folder})
+                    if _stored(folder, plan) == there.plan:
+                        return cls(folder, plan)
+                written = there.model_copy(update={"plan": _stored(folder, plan)})
             else:
                 if folder.exists() and any(not p.name.startswith(".") for p in folder.iterdir()):
                     raise InputError(f"{folder} holds files that are no data set: use another "
                                      "--out")
-                written = DataSetFile(drawing=DRAWING, plan=plan, versions=dict(versions))
+                written = DataSetFile(drawing=DRAWING, plan=_stored(folder, plan),
+                                      versions=dict(versions))
         except OSError as error:
             raise InputError(explain(folder, error)) from error
         with cls(folder, plan)._changing():
@@ -288,6 +293,32 @@ class DataSet:
 def _part(path: Path) -> Part:
     data = read_bytes(path)
     return Part(bytes=len(data), sha256=hashlib.sha256(data).hexdigest())
+
+
+def _stored(folder: Path, plan: Plan) -> Plan:
+    """The plan as dataset.json has it: where files are is said from the data set's folder, so that
+    both may be moved together."""
+    if not plan.folder:
+        return plan
+    with suppress(ValueError):  # another drive
+        return plan.model_copy(update={"folder": Path(os.path.relpath(
+            plan.folder, folder.resolve())).as_posix()})
+    return plan
+
+
+def _plan_in(folder: Path, stored: Plan) -> Plan:
+    """The reverse of `_stored`."""
+    if not stored.folder:
+        return stored
+    return stored.model_copy(update={"folder": (folder / stored.folder).resolve().as_posix()})
+
+
+def _require_same_files(folder: Path, there: Plan, plan: Plan) -> None:
+    if there.contents.keys() == plan.contents.keys():
+        for name, content in there.contents.items():
+            if content != plan.contents[name]:
+                raise InputError(f"{name}, or a file that it names, has changed since {folder} was "
+                                 "begun: put it back, or use another --out")
 
 
 def _difference(a: Plan, b: Plan) -> str:

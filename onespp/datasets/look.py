@@ -16,8 +16,10 @@ from onespp.render.channels import asked_channels
 from onespp.render.errors import InputError
 from onespp.render.job import RenderJob
 from onespp.scenes.description import Mesh, Scene
-from onespp.scenes.drawn.draw import Drawn, draw
+from onespp.scenes.drawn.choices import FILES
+from onespp.scenes.drawn.draw import Drawn, draw, family_of
 
+from .files import drawn_of_file
 from .plan import Plan
 
 MOST_ATTEMPTS = 20
@@ -57,7 +59,8 @@ def usable(plan: Plan, number: int) -> Usable:
     """
     rejected: list[str] = []
     for attempt in range(MOST_ATTEMPTS):
-        drawn = draw(plan.request(number, attempt))
+        request = plan.request(number, attempt)
+        drawn = (drawn_of_file(plan, request) if family_of(request) == FILES else draw(request))
         job = _job(plan, number, drawn.scene)
         why = inside(drawn, job.frames) or unlike_a_picture(drawn, _seen(job))
         if why is None:
@@ -109,6 +112,12 @@ def unlike_a_picture(drawn: Drawn, frames: Iterable[Seen]) -> str | None:
     things = [i for i, name in enumerate(names) if name in drawn.things]
     lamps = [names.index(lamp["name"]) for lamp in drawn.record["lamps"]]
     for frame in frames:
+        if drawn.record["family"] == FILES:  # in its own light, of its own size
+            if not luminance(frame.color).mean() > 0:
+                return f"frame {frame.index} of {drawn.record['file']} is black"
+            if np.mean(frame.depth > 0) < _FEWEST_THINGS:
+                return f"frame {frame.index} of {drawn.record['file']} shows nothing"
+            continue
         light, depth = displayed(frame.color), frame.depth
         if not light >= DARKEST:  # NaN, too
             return f"frame {frame.index} is dark"

@@ -11,7 +11,6 @@ import hashlib
 import json
 import sys
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -24,6 +23,8 @@ from onespp.render.files.json_file import JsonFile, explain
 from onespp.scenes.description import LARGEST_SIDE, MOST_FRAMES, SceneError
 from onespp.scenes.drawn.choices import Choices, HeldOut
 from onespp.scenes.drawn.draw import Request, spread
+
+from .patterns import names_of
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -60,6 +61,8 @@ class Plan(JsonFile):
         reference_spp, reference_error: as of `onespp render`; one of them, or none.
         antialias, half, channels: likewise.
         draw: what from. split: for what. held_out: what the test split alone has.
+        folder: from which the names of files in `draw` and `held_out` are.
+        contents: of each of these files, a hash; see `files.opened`.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,59}$")]
@@ -79,6 +82,8 @@ class Plan(JsonFile):
     draw: Choices = Choices()
     split: Split = Split()
     held_out: HeldOut = HeldOut()
+    folder: str = ""
+    contents: dict[str, str] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Plan:
@@ -96,7 +101,7 @@ class Plan(JsonFile):
     @property
     def key(self) -> str:
         """A hash of all that a sequence follows from."""
-        text = self.model_dump_json(exclude={"sequences", "about", "licence"})
+        text = self.model_dump_json(exclude={"sequences", "about", "licence", "folder"})
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def split_of(self, number: int) -> str:
@@ -121,10 +126,8 @@ class Plan(JsonFile):
         return MOST_SEEDS * number + k
 
     def _choices(self, split: str) -> Choices:
-        if split != "test":
-            return self.held_out.left(self.draw)
-        families = self.held_out.families or self.draw.families
-        return replace(self.draw, families=families)
+        of = self.held_out.alone if split == "test" else self.held_out.left
+        return of(self.draw)
 
 
 def read_plan(plan: str | Path, changes: Mapping[str, Any] | None = None) -> Plan:
@@ -133,11 +136,15 @@ def read_plan(plan: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
     Args:
         changes: key -> value that replaces the file's; a key inside a table is "draw.things".
 
+    Patterns of files become names, from the folder that the file is in; for a plan that comes
+    along, from the working directory.
+
     Raises:
         InputError: no such plan, or something in it cannot be used.
     """
-    path = Path(plan)
+    path, folder = Path(plan), Path(plan).parent
     if str(plan) in PRESETS:
+        folder = Path()
         path = Path(__file__).with_name(f"{plan}.toml")
     elif path.suffix != ".toml":
         close = difflib.get_close_matches(str(plan), PRESETS, n=1)
@@ -147,19 +154,26 @@ def read_plan(plan: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
         values = tomllib.loads(read_bytes(path).decode())
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path} is not a TOML file ({error})") from None
-    return changed(values, changes or {}, str(path))
+    return changed(values, changes or {}, str(path), folder)
 
 
 def changed_plan(plan: Plan, changes: Mapping[str, Any]) -> Plan:
     """The plan with other settings; InputError where they do not fit."""
-    return changed(plan.model_dump(mode="json", exclude_none=True), changes, "the plan")
+    return changed(plan.model_dump(mode="json", exclude_none=True), changes, "the plan", Path())
 
 
-def changed(values: dict[str, Any], changes: Mapping[str, Any], what: str) -> Plan:
-    """A plan of a TOML file's tables, some settings changed."""
+def changed(values: dict[str, Any], changes: Mapping[str, Any], what: str, folder: Path) -> Plan:
+    """A plan of a TOML file's tables, some settings changed; files are from `folder`."""
     for key, value in changes.items():
         _change(values, key, value)
-    return checked_plan(values, what)
+    plan = checked_plan(values, what)
+    if not plan.draw.files and not plan.held_out.files:
+        return plan
+    values = plan.model_dump(mode="json", exclude_none=True)
+    folder = (folder / plan.folder).resolve()
+    for table, patterns in (("draw", plan.draw.files), ("held_out", plan.held_out.files)):
+        values[table]["files"] = names_of(patterns, folder, f"{what}, {table}.files,")
+    return checked_plan({**values, "folder": folder.as_posix()}, what)
 
 
 def checked_plan(values: Mapping[str, Any], what: str) -> Plan:

@@ -41,6 +41,7 @@ class Document:
 
     Attributes:
         root: the whole JSON. unused: what of the file is not used, in words -> where first.
+        files: what was read so far: the file itself, buffers and images beside it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -51,11 +52,13 @@ class Document:
                              f"{'it is a folder' if path.is_dir() else 'there is no such file'}")
         self._buffers: dict[int, bytes] = {}
         self.unused: dict[str, str] = {}
+        self.files: dict[Path, None] = {}
         text, self._chunk = self._split(self._bytes(path, Item({}, "", self._file)))
         self.root = self._parsed(text)
         self._check()
 
     def _bytes(self, path: Path, item: Item) -> bytes:
+        self.files[path] = None
         try:
             return path.read_bytes()
         except (OSError, ValueError) as error:

@@ -74,7 +74,8 @@ def _loaded(document: Document, accessors: Accessors, path: Path, sensor: int) -
         height=height, max_depth=MAX_DEPTH, fps=FPS, environment=sky, lights=points)
     scene.try_frames([0, scene.frames - 1])
     unused = ", ".join(f"{what} ({where})" for what, where in document.unused.items())
-    return Loaded(scene, unused, f"{path.name} has {' and '.join(added)}" if added else "")
+    return Loaded(scene, unused, f"{path.name} has {' and '.join(added)}" if added else "",
+                  tuple(document.files))
 
 
 def _shapes(document: Document, accessors: Accessors, shown: list[Node]) -> tuple[Shape, ...]:

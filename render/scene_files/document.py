@@ -101,8 +101,8 @@ class Node:
         return Path(value)
 
 
-def read_document(path: Path, parameters: Mapping[str, str]) -> Node:
-    """The root of a file, a node of kind "scene".
+def read_document(path: Path, parameters: Mapping[str, str]) -> tuple[Node, tuple[Path, ...]]:
+    """The root of a file, a node of kind "scene"; and the file with all those that it names.
 
     Args:
         parameters: values for the file's `$name`.
@@ -122,7 +122,8 @@ def read_document(path: Path, parameters: Mapping[str, str]) -> Node:
             mi.parser.transform_resolve(config, state)
         except (RuntimeError, TypeError) as error:
             raise _refused(str(error), shown) from None
-        return _Reader(state).root()
+        reader = _Reader(state)
+        return reader.root(), tuple(dict.fromkeys((path, *sorted(reader.files))))
 
 
 @contextmanager
@@ -144,6 +145,7 @@ class _Reader:
     def __init__(self, state: Any) -> None:
         self._state = state
         self._made: dict[int, Node] = {}
+        self.files: set[Path] = set()
 
     def root(self) -> Node:
         root = self._node(0, ())
@@ -155,7 +157,10 @@ class _Reader:
         if index in self._made:
             return self._made[index]
         node = self._state.nodes[index]
-        where = _where(mi.parser.file_location(self._state, node))
+        place = mi.parser.file_location(self._state, node)
+        where = _where(place)
+        if stands := _PLACE.match(place):  # in an included file, perhaps
+            self.files.add(Path(stands["file"]))
         if index in inside or len(inside) > _DEEPEST:
             raise SceneError(f"{where}: it is nested in itself, or more than {_DEEPEST} deep: use "
                              "a simpler one")
@@ -180,7 +185,9 @@ class _Reader:
         if kind == types.Spectrum:
             return _spectrum(value)
         if kind == types.String and key == "filename":
-            return str(mi.file_resolver().resolve(value))
+            named = str(mi.file_resolver().resolve(value))
+            self.files.add(Path(named))
+            return named
         if isinstance(value, bool | int | float | str):
             return value
         raise SceneError(f"{where}: the value of '{key}' is of a kind that is not supported: use "

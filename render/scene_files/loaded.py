@@ -18,11 +18,13 @@ class Loaded:
     Attributes:
         unused: what of the file is not used, in words; "" if nothing.
         added: what it has beside, in a sentence; "" if nothing.
+        files: what it was read from: the file itself, and those that it names.
     """
 
     scene: Scene
     unused: str
     added: str = ""
+    files: tuple[Path, ...] = ()
 
 
 def scene_name(path: Path) -> str:

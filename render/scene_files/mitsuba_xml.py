@@ -44,7 +44,7 @@ def load_xml(path: Path, parameters: Mapping[str, str] | None = None, sensor: in
         SceneError: there is no such file, or it cannot be rendered here; one sentence with the
             file, the line and the column.
     """
-    root = read_document(path, dict(parameters or {}))
+    root, files = read_document(path, dict(parameters or {}))
     camera_node = _sensor(root, path, sensor)
     camera, width, height = _camera(camera_node)
     if media := camera_node.parts("medium"):
@@ -63,7 +63,7 @@ def load_xml(path: Path, parameters: Mapping[str, str] | None = None, sensor: in
         text = str(error)
         raise SceneError(text if text.startswith("scene file") else
                          f"scene file '{path}': {text}") from None
-    return Loaded(scene, ", ".join(_unused(root, camera_node, integrator)))
+    return Loaded(scene, ", ".join(_unused(root, camera_node, integrator)), files=files)
 
 
 def _sensor(root: Node, path: Path, number: int) -> Node:

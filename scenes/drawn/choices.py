@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 from onespp.scenes.description import SceneError
 
-Family = Literal["room", "window", "ground", "corner", "hall", "columns"]
+Family = Literal["room", "window", "ground", "corner", "hall", "columns", "files"]
 Object = Literal["crate", "ball", "vase", "ring", "block", "goblet", "sheet", "stack", "egg",
                  "hoop", "drum", "cone", "bowl", "pawn"]
 Material = Literal["plain", "checks", "varnish", "wood", "metal", "weave", "grain", "polished",
@@ -17,6 +17,9 @@ Light = Literal["panels", "unequal", "close", "changing", "sun", "overcast", "ni
 Motion = Literal["still", "spin", "slide", "stop and go", "bounce", "spline"]
 CameraMove = Literal["still", "orbit", "dolly", "handheld", "cut"]
 
+FILES = "files"
+"""The family of scenes that are read from the user's own files, with the light that is in them."""
+PLACES: tuple[Family, ...] = tuple(family for family in get_args(Family) if family != FILES)
 LIGHTS_OF: dict[str, tuple[str, ...]] = {
     "room": ("panels", "unequal", "close", "changing"),
     "window": ("sun", "panels", "overcast", "changing"),
@@ -36,16 +39,19 @@ class Choices:
     Attributes:
         families: of places. objects, materials, lights, motions, cameras: names of kinds; a name
             that is there twice is drawn twice as often.
+        files: names of scene files (in a plan file: patterns), for the family "files".
         things: fewest and most of them. speed: of things and cameras, 1: as `generated/` scenes.
         exposure: stops, 0: neither dark nor blown (`generated/exposure.py`).
         sharp: mirrors and glass among small lamps too, whose light in them references find late.
 
     Raises:
         SceneError: a list without names, a range that is empty or out of bounds, a family that
-            none of the lights suits, or nothing but glass and mirrors to make things of.
+            none of the lights suits, nothing but glass and mirrors to make things of, or files
+            without their family or the reverse.
     """
 
-    families: tuple[Family, ...] = get_args(Family)
+    families: tuple[Family, ...] = PLACES
+    files: tuple[str, ...] = ()
     objects: tuple[Object, ...] = get_args(Object)
     materials: tuple[Material, ...] = get_args(Material)
     lights: tuple[Light, ...] = get_args(Light)
@@ -66,10 +72,16 @@ class Choices:
                 raise SceneError(f"{name} is [{low}, {high}]: use two numbers from {least} to "
                                  f"{most}, the smaller one first")
         for family in self.families:
-            if not self.lights_of(family):
+            if family != FILES and not self.lights_of(family):
                 raise SceneError(f"none of the lights suits the family '{family}': add one of "
                                  f"{', '.join(LIGHTS_OF[family])}")
         require_plain_material(self.materials, "materials")
+        if FILES in self.families and not self.files:
+            raise SceneError("families has 'files', and there are none: name some, as files = "
+                             "[\"models/*.glb\"], hold fewer of them out, or leave the family out")
+        if self.files and FILES not in self.families:
+            raise SceneError("there are files, and families has no 'files': add it, as families = "
+                             "[\"room\", \"files\"], or leave the files out")
 
     def lights_of(self, family: str) -> tuple[str, ...]:
         """The chosen lights that suit a family."""
@@ -83,9 +95,11 @@ class HeldOut:
     Attributes:
         families: of which the test split's places are, if there are any. objects, materials: each
             thing of the test split is of one of these objects, or of one of these materials.
+        files: those that the test split shows, as places of the family "files".
     """
 
     families: tuple[Family, ...] = ()
+    files: tuple[str, ...] = ()
     objects: tuple[Object, ...] = ()
     materials: tuple[Material, ...] = ()
 
@@ -99,9 +113,23 @@ class HeldOut:
         Raises:
             SceneError: nothing is left.
         """
-        return replace(choices, **{name: tuple(kind for kind in getattr(choices, name)
-                                               if kind not in getattr(self, name))
-                                   for name in ("families", "objects", "materials")})
+        kept = {name: tuple(kind for kind in getattr(choices, name)
+                            if kind not in getattr(self, name))
+                for name in ("families", "files", "objects", "materials")}
+        return replace(choices, **{**kept, "files": kept["files"] if FILES in kept["families"]
+                                   else ()})
+
+    def alone(self, choices: Choices) -> Choices:
+        """The choices with these families and files in place of theirs, where there are any.
+
+        Raises:
+            SceneError: the family "files" without files.
+        """
+        families = self.families or choices.families
+        if self.families and self.files and FILES not in families:
+            families += tuple(family for family in choices.families if family == FILES)
+        files = self.files or choices.files
+        return replace(choices, families=families, files=files if FILES in families else ())
 
 
 def require_plain_material(materials: Sequence[str], name: str) -> None:

@@ -30,6 +30,9 @@ T = TypeVar("T")
 _GOLDEN = (math.sqrt(5) - 1) / 2
 DRAWING = 3
 """Counts the changes of what is drawn for the same request."""
+_DEALT = {kind: (step, salt + 1) for salt, (kind, step) in enumerate((
+    ("family", math.sqrt(2)), ("light", math.sqrt(3)), ("camera", math.sqrt(7)),
+    ("file", math.sqrt(11))))}
 _SHADE = diffuse((0.55, 0.55, 0.55))
 """Of lamps, whose backs are seen here: black ones, as `generated/` has, are holes in a picture."""
 
@@ -75,11 +78,11 @@ def spread(number: int, step: float = _GOLDEN, start: float = 0.5) -> float:
 
 
 def draw(request: Request) -> Drawn:
-    """The scene."""
+    """The scene; of a place, no file (`family_of`)."""
     r, choices = request, request.choices
-    family = _dealt(choices.families, r, math.sqrt(2), 1)
-    light = _dealt(choices.lights_of(family), r, math.sqrt(3), 2)
-    move = _dealt(choices.cameras, r, math.sqrt(7), 3)
+    family = family_of(r)
+    light = dealt(choices.lights_of(family), r, "light")
+    move = dealt(choices.cameras, r, "camera")
     key = (r.seed, r.number, r.attempt)
     random = np.random.default_rng((*key, 5))
     ground, wall, *colors = palette(random)
@@ -110,7 +113,14 @@ def draw(request: Request) -> Drawn:
     return Drawn(scene, tuple(thing.shape.name for thing in found), record)
 
 
-def _dealt(kinds: Sequence[T], request: Request, step: float, salt: int) -> T:
+def family_of(request: Request) -> str:
+    """The family of the scene's place; `FILES`: it is a file's."""
+    return dealt(request.choices.families, request, "family")
+
+
+def dealt(kinds: Sequence[T], request: Request, what: str) -> T:
+    """One of some kinds, by the request's number; `what`: "family", "light", "camera", "file"."""
+    step, salt = _DEALT[what]
     start = float(np.random.default_rng((request.seed, salt)).random())
     return kinds[int(spread(request.number, step, start) * len(kinds))]
 
