@@ -4,6 +4,9 @@ A task is known by the plan's hash and its number, makes what is missing in the 
 returns the hash of what is there. So a task whose worker died is run again by another one, which
 goes on with the files that are whole; and one that runs twice, because a scheduler has lost sight
 of a worker, waits for the other by the lock on the sequence's folder.
+
+A scheduler that ends takes with it what it knew of tasks, and its workers end as well. What was not
+done is given to it anew when it is back, which workers make from the files that are whole.
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
@@ -28,6 +31,8 @@ from .making import Outcome, in_a_line, make, make_alone, note_failure
 
 LOCAL = "local"
 _SECONDS_TO_CONNECT = 15
+_SECONDS_TO_COME_BACK = 300
+_MOST_LOSSES = 3  # of the scheduler, while nothing gets done
 _SECONDS_BETWEEN_LOOKS = 0.2
 _SECONDS_FOR_ANOTHER = 3600.0  # that a sequence may take the process that has it
 
@@ -47,30 +52,47 @@ def make_by_pool(data: DataSet, numbers: Iterable[int], address: str, workers: i
             cores shared out among the workers of a machine.
 
     Raises:
-        InputError: Dask is not installed, or there is no such scheduler.
+        InputError: Dask is not installed, there is no such scheduler, or it was lost and does not
+            come back.
     """
     numbers, there = list(numbers), {*data.numbers()}
     outcome, what = Outcome([n for n in numbers if n in there]), f"data set {data.plan.name}"
     waiting = [n for n in numbers if n not in there]
     folder = str(data.folder.resolve())
-    with _client(address, workers) as client:
-        if address == LOCAL:
-            threads = threads or max(1, (os.cpu_count() or 1) // _workers(workers))
+    if address == LOCAL:
+        threads = threads or max(1, (os.cpu_count() or 1) // _workers(workers))
+
+    def submitted(client: Any, numbers: Iterable[int], last: bool) -> dict[Any, int]:
+        # A new key for the second try: a task that has failed is remembered as that.
+        return {client.submit(task, folder, n, threads, last, retries=0, pure=False,
+                              key=f"{data.plan.key}-{n}-{int(last)}"): n for n in numbers}
+
+    def look() -> None:
+        progress(len(outcome.made), len(numbers), what)
+
+    connection = _Connection(address, workers)
+    try:
         for last in (False, True):
-            # A new key for the second try: a task that has failed is remembered as that.
-            tasks = {client.submit(task, folder, n, threads, last, retries=0, pure=False,
-                                   key=f"{data.plan.key}-{n}-{int(last)}"): n for n in waiting}
-            waiting = []
-            progress(len(outcome.made), len(numbers), what)
-            for done, number in _as_they_end(tasks, lambda: progress(len(outcome.made),
-                                                                     len(numbers), what)):
-                error = done.exception() if done.status == "error" else None
-                if error is None and done.status == "finished":
-                    outcome.made.append(number)
-                else:
-                    error = error or InputError(f"its task was {done.status}")
-                    waiting += note_failure(data, outcome, number, error, last, tell)
-            progress(len(outcome.made), len(numbers), what)
+            failed: list[int] = []
+            while waiting:
+                lost, before = [], len(outcome.made)
+                look()
+                for done, number in _as_they_end(submitted(connection.client, waiting, last), look):
+                    if done.status == "finished":
+                        outcome.made.append(number)
+                    elif done.status == "error":
+                        failed += note_failure(data, outcome, number, done.exception(), last, tell)
+                    else:  # cancelled, or lost
+                        lost.append(number)
+                if lost:
+                    tell(f"the scheduler was lost with {len(lost)} sequences to go, which it is "
+                         "given when it is back; its workers have to be started again, too")
+                    connection.again(made_some=len(outcome.made) > before)
+                waiting = lost
+            waiting = sorted(failed)
+            look()
+    finally:
+        connection.close()
     return outcome
 
 
@@ -125,8 +147,34 @@ def _without_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+class _Connection:
+    """A client of a scheduler, and another one where that was lost."""
+
+    def __init__(self, address: str, workers: int | None) -> None:
+        self._address, self._workers, self._held, self._losses = address, workers, ExitStack(), 0
+        self.client = self._held.enter_context(_client(address, workers))
+
+    def again(self, made_some: bool) -> None:
+        """Connect anew, as soon as there is a scheduler; InputError where that does not help."""
+        self._losses = 1 if made_some else self._losses + 1
+        self.close()
+        try:
+            if self._losses > _MOST_LOSSES:
+                raise InputError(f"it was lost {self._losses} times")
+            self.client = self._held.enter_context(_client(self._address, self._workers,
+                                                           _SECONDS_TO_COME_BACK))
+        except InputError as error:
+            raise InputError(f"the Dask scheduler at {self._address} was lost, and did not come "
+                             f"back for long ({error.__cause__ or error}): start it and its "
+                             "workers, and run the same command again, which goes on") from error
+
+    def close(self) -> None:
+        self._held.close()
+
+
 @contextmanager
-def _client(address: str, workers: int | None) -> Iterator[Any]:
+def _client(address: str, workers: int | None,
+            seconds: float = _SECONDS_TO_CONNECT) -> Iterator[Any]:
     """A client of the scheduler, which ends with it if it was started here."""
     try:
         import distributed
@@ -143,7 +191,7 @@ def _client(address: str, workers: int | None) -> Iterator[Any]:
             yield client
         return
     try:
-        client = distributed.Client(address, timeout=_SECONDS_TO_CONNECT)
+        client = distributed.Client(address, timeout=seconds)  # pyright: ignore
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(f"there is no Dask scheduler at {address} ({in_a_line(error)}): start one "
                          "with `dask scheduler`, or use --dask local") from error

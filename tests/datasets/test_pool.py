@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
+from contextlib import ExitStack, contextmanager, suppress
+from types import SimpleNamespace
 
 import pytest
 
@@ -16,6 +19,7 @@ from onespp.datasets import pool
 from onespp.datasets.folder import DataSet
 from onespp.datasets.plan import read_plan
 from onespp.render.errors import InputError
+from onespp.render.host.versions import versions
 from tests.datasets.test_making import files
 
 SMALL = {"sequences": 4, "frames": 2, "size": (16, 24), "reference_spp": 16}
@@ -64,6 +68,89 @@ def test_workers_that_are_killed_lose_nothing(tmp_path):
     assert data.verify() == []
     left = {name: text for name, text in files(data.folder).items() if not name.endswith(".lock")}
     assert left == files(tmp_path / "one")
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_killed_and_started_anew_loses_nothing(tmp_path):
+    """Its workers, which end with it, are started anew as well."""
+    pytest.importorskip("distributed")
+    onespp.dataset("simple", tmp_path / "one", **SMALL)
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    address, running = f"tcp://127.0.0.1:{port}", ExitStack()
+
+    def start() -> subprocess.Popen[bytes]:
+        scheduler = ["scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+        worker = ["worker", address, "--nthreads", "1", "--no-dashboard"]
+        begun = [running.enter_context(subprocess.Popen(
+            [sys.executable, "-m", "dask", *command], stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL)) for command in (scheduler, worker, worker)]
+        for process in begun:
+            running.callback(process.terminate)
+        while True:
+            with suppress(OSError), socket.create_connection(("127.0.0.1", port)):
+                return begun[0]
+            assert begun[0].poll() is None
+            time.sleep(0.1)
+
+    def restart() -> None:
+        while not list((tmp_path / "pool").rglob("frames/*.exr")):
+            time.sleep(0.1)
+        scheduler.kill()
+        scheduler.wait()
+        killed.append(len(DataSet.open(tmp_path / "pool").numbers()))
+        start()
+
+    with running:
+        killed: list[int] = []
+        scheduler = start()
+        killer = threading.Thread(target=restart, daemon=True)
+        killer.start()
+        said: list[str] = []
+        data = DataSet.create(tmp_path / "pool", read_plan("simple", {
+            **{key: SMALL[key] for key in ("sequences", "frames", "reference_spp")},
+            "height": 16, "width": 24}), versions("mitsuba", "drjit", "numpy"))
+        outcome = pool.make_by_pool(data, range(4), address, threads=1, tell=said.append)
+        killer.join(60)
+    assert killed[0] < 4
+    assert sorted(outcome.made) == [0, 1, 2, 3]
+    assert len(said) == 1
+    assert "the scheduler was lost with" in said[0]
+    data.finish()
+    assert data.verify() == []
+    left = {name: text for name, text in files(data.folder).items() if not name.endswith(".lock")}
+    assert left == files(tmp_path / "one")
+
+
+def test_a_scheduler_that_does_not_come_back_is_told(tmp_path, monkeypatch):
+    """A client whose tasks are all cancelled, as those of a scheduler that is gone."""
+    class Gone:
+        status = "cancelled"
+
+        def done(self) -> bool:
+            return True
+
+    opened: list[float] = []
+
+    @contextmanager
+    def client(address, workers, seconds=15):
+        if seconds != 15:
+            opened.append(seconds)
+            if len(opened) == 2:
+                raise InputError("there is no Dask scheduler")
+        yield SimpleNamespace(submit=lambda *arguments, **options: Gone())
+
+    monkeypatch.setattr(pool, "_client", client)
+    data = DataSet.create(tmp_path / "d", read_plan("simple", {"sequences": 2}), {})
+    told: list[str] = []
+    with pytest.raises(InputError, match=r"at tcp://a:1 was lost, .* run the same command again"):
+        pool.make_by_pool(data, range(2), "tcp://a:1", tell=told.append)
+    assert len(opened) == len(told) == 2
+    opened[:] = [0, 0]
+    with pytest.raises(InputError, match="it was lost 4 times"):
+        pool.make_by_pool(data, range(2), "tcp://a:1")
+    assert data.failed() == []
 
 
 @pytest.mark.slow
