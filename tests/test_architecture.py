@@ -22,7 +22,8 @@ ROOT = Path(__file__).parents[1]
 ROOMS = (
     "onespp.__main__", "onespp.cli", "onespp.templates", "onespp.denoise.cli", "onespp.render.cli",
     "onespp", "onespp.api", "onespp.training",
-    "onespp.datasets.pool", "onespp.datasets.preview", "onespp.datasets.making",
+    "onespp.datasets.pool", "onespp.datasets.slurm", "onespp.datasets.preview",
+    "onespp.datasets.making",
     "onespp.datasets.look", "onespp.datasets.files", "onespp.clips", "onespp.datasets.processes",
     "onespp.datasets",
     "onespp.denoise.report", "onespp.denoise.bench", "onespp.denoise.studies",

@@ -11,6 +11,7 @@ from onespp.datasets.folder import DataSet
 from onespp.datasets.making import make_all
 from onespp.datasets.plan import Plan, changed_plan, read_plan
 from onespp.datasets.pool import make_by_pool
+from onespp.datasets.slurm import LOGS, submit
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_bytes
 from onespp.render.files.frame_ranges import part_of
@@ -28,7 +29,8 @@ def dataset(plan: str | Path | Plan, out: Path | str, *, sequences: int | None =
             seed: int | None = None, seeds: int | None = None, reference_spp: int | None = None,
             reference_error: float | None = None, changes: Mapping[str, Any] | None = None,
             part: str | None = None, dask: str | None = None, workers: int | None = None,
-            threads: int | None = None) -> DataSet:
+            threads: int | None = None, slurm: int | None = None,
+            sbatch: Mapping[str, Any] | None = None) -> DataSet:
     """Make a data set: many different animated scenes, with noisy frames and references.
 
     What the folder holds already is not made again: the same call goes on where it was stopped, and
@@ -46,6 +48,8 @@ def dataset(plan: str | Path | Plan, out: Path | str, *, sequences: int | None =
         dask: "local" for a pool of processes here (`workers` of them, default one a core), or the
             address of a Dask scheduler whose workers see the folder by the same path.
         threads: of each worker for kernels.
+        slurm: give the sequences to Slurm in so many parts, and do not wait for them. sbatch: long
+            options of its command of this name, as {"partition": "cpu", "time": 60}.
 
     Returns:
         The data set; `status()` says how far it is, `verify()` reads everything again, and
@@ -62,6 +66,8 @@ def dataset(plan: str | Path | Plan, out: Path | str, *, sequences: int | None =
         >>> data.status().made, data.verify()
         (1, [])
     """
+    if sum(way is not None for way in (part, dask, slurm)) > 1:
+        raise InputError("--part, --dask and --slurm are three ways to share the work: use one")
     made = planned(plan, sequences=sequences, frames=frames, size=size, seed=seed, seeds=seeds,
                    reference_spp=reference_spp, reference_error=reference_error, changes=changes)
     numbers = part_of(range(made.sequences), part)
@@ -72,6 +78,12 @@ def dataset(plan: str | Path | Plan, out: Path | str, *, sequences: int | None =
     who = caller()
     made = opened(made, who.inform)
     data = DataSet.create(out, made, versions("mitsuba", "drjit", "numpy"))
+    if slurm is not None:
+        jobs, last = submit(data, slurm, sbatch or {}, threads)
+        who.inform(f"{len(jobs)} parts are jobs {jobs[0].job_id} to {jobs[-1].job_id} of Slurm, "
+                   f"and {last.job_id} ends the data set after them: see {data.folder / LOGS} for "
+                   "what they say, and --status")
+        return data
     try:
         with who.progress() as report:
             if dask is None:

@@ -37,6 +37,12 @@ from onespp.render.errors import InputError
               "whose workers see the folder by the same path; pip install 'onespp[dask]'.")
 @click.option("--workers", type=click.IntRange(1, 1024), metavar="N",
               help="Processes of --dask local; default one a core.")
+@click.option("--slurm", type=int, metavar="K",
+              help="By K jobs of Slurm and one after them, and do not wait; pip install "
+              "'onespp[slurm]'.")
+@click.option("--sbatch", "sbatch", multiple=True, metavar="KEY=VALUE",
+              help="An option of these jobs as sbatch has it, without the dashes: time=120 (in "
+              "minutes), partition=cpu, cpus-per-task=4, mem=8G; may be given several times.")
 @click.option("--preview", type=int, metavar="N",
               help="Only draw a contact sheet of the first N scenes: preview.png in the folder, or "
               "DIR-preview.png while there is no data set.")
@@ -47,7 +53,8 @@ from onespp.render.errors import InputError
 @threads_option
 def dataset(plan: str | None, out: Path | None, settings: tuple[str, ...], preview: int | None,
             status: bool, verify: Path | None, device: str, threads: int | None, size: str | None,
-            part: str | None, dask: str | None, workers: int | None, **numbers) -> None:
+            part: str | None, dask: str | None, workers: int | None, slurm: int | None,
+            sbatch: tuple[str, ...], **numbers) -> None:
     """Make a data set by PLAN: simple, rooms, hard, or a TOML file.
 
     Running the same command again makes what is missing, also at the same time on several machines
@@ -68,7 +75,7 @@ def dataset(plan: str | None, out: Path | None, settings: tuple[str, ...], previ
     if status:
         click.echo(str(DataSet.open(folder).status()))
         return
-    use(device, threads if dask is None else None)
+    use(device, threads if dask is None and slurm is None else None)
     if preview is not None:
         # Beside the folder while there is no data set: a folder that holds other files is refused.
         sheet = (folder / "preview.png" if (folder / "dataset.json").exists()
@@ -77,12 +84,23 @@ def dataset(plan: str | None, out: Path | None, settings: tuple[str, ...], previ
             click.echo(line)
         click.echo(f"drew {preview} scenes into {sheet}")
         return
-    data = api.dataset(planned, folder, part=part, dask=dask, workers=workers, threads=threads)
+    data = api.dataset(planned, folder, part=part, dask=dask, workers=workers, threads=threads,
+                       slurm=slurm, sbatch=dict(map(option_of, sbatch)))
+    if slurm is not None:
+        return
     found = data.status()
     click.echo(f"{data.folder}: {found}")
     if found.failed:
         raise InputError(f"{len(found.failed)} of {data.plan.sequences} sequences could not be "
                          f"made: see {data.folder}/failures, then run the same command again")
+
+
+def option_of(text: str) -> tuple[str, str]:
+    """The key and the value of 'KEY=VALUE'; InputError if it is none."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip("- ") or not value.strip():
+        raise InputError(f"--sbatch {text} is not understood: use KEY=VALUE, as time=120")
+    return key.strip("- "), value.strip()
 
 
 def _verify(data: DataSet) -> None:
