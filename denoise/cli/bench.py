@@ -31,7 +31,8 @@ def bench(context: click.Context, size: str, repeats: int, methods: tuple[str, .
           json_to: str | None, device: str, threads: int | None) -> None:
     """Measure the denoising kernels on this machine, against Open Image Denoise and its limits.
 
-    `bench render` times the renderer, `bench reference` says what its references are worth.
+    `bench render` times the renderer, `bench reference` says what its references are worth, `bench
+    clips` how fast a data set is read.
     """
     if context.invoked_subcommand is not None:
         return

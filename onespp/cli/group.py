@@ -19,6 +19,7 @@ from onespp.render.cli.imports import import_
 from onespp.render.cli.render import export, render
 from onespp.render.cli.terminal import run as run_command
 
+from .bench_clips import bench_clips
 from .completion import completion
 from .dataset import dataset
 from .doctor import doctor
@@ -47,6 +48,7 @@ for command in (scenes, render, denoise, time_, score, run, report, view, compar
                 completion):
     command.epilog = EXIT_CODES.get(command.name or "", EXIT_CODES[""])
     app.add_command(command)
+bench.add_command(bench_clips)
 for command in (*bench.commands.values(), *train.commands.values()):
     command.epilog = EXIT_CODES[""]
 
