@@ -8,12 +8,12 @@ from pathlib import Path
 from onespp.render.host.turns import turn
 from onespp.render.scene_files.loaded import Loaded
 
-XML, GLTF = ".xml", (".glb", ".gltf")
-SUFFIXES = (XML, *GLTF)
+XML, GLTF, BLEND = ".xml", (".glb", ".gltf"), ".blend"
+SUFFIXES = (XML, *GLTF, BLEND)
 
 
 def is_scene_file(path: str | Path) -> bool:
-    """Whether a file of this name is one of Mitsuba's or of glTF's."""
+    """Whether a file of this name is one of Mitsuba's, glTF's or Blender's."""
     return str(path).lower().endswith(SUFFIXES)
 
 
@@ -31,6 +31,10 @@ def scene_of_file(path: Path, define: Mapping[str, str] | None = None, sensor: i
             from onespp.render.scene_files.mitsuba_xml import load_xml
 
             return load_xml(path, define, sensor)
+        if str(path).lower().endswith(BLEND):
+            from onespp.render.gltf.blender import load_blend
+
+            return load_blend(path, sensor)
         from onespp.render.gltf.gltf import load_gltf
 
         return load_gltf(path, sensor)

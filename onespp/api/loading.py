@@ -1,4 +1,4 @@
-"""A scene by name, from a file of Python, of Mitsuba's or of glTF, to render or to move."""
+"""A scene by name, or from a file of Python, Mitsuba, glTF or Blender, to render or to move."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ def load(scene: str | Path | Scene, *, define: Mapping[str, object] | None = Non
 
     Args:
         scene: a name of `onespp.scenes()`, the path of a `.py` file, a Mitsuba 3 `.xml`
-            file or a glTF 2.0 file (`.glb`, `.gltf`), or a `Scene`, which is returned as it is.
+            file, a glTF 2.0 file (`.glb`, `.gltf`) or one of Blender's (`.blend`, by the Blender
+            that is installed), or a `Scene`, which is returned as it is.
         define: values for the `$name` of an XML file, by name.
         sensor: which of an XML or glTF file's cameras, from 0.
 
@@ -42,13 +43,13 @@ def load(scene: str | Path | Scene, *, define: Mapping[str, object] | None = Non
         return scene
     if not isinstance(scene, str | Path):
         raise SceneError(f"a scene is a {type(scene).__name__}: use a name of onespp.scenes(), the "
-                         "path of a .py, .xml, .glb or .gltf file, or a onespp.Scene")
+                         "path of a .py, .xml, .glb, .gltf or .blend file, or a onespp.Scene")
     if define and not str(scene).lower().endswith(XML):
         raise InputError(f"-D is for Mitsuba's XML files, and '{scene}' is none: leave it out")
     if not is_scene_file(scene):
         if sensor:
-            raise InputError(f"--sensor is for files of Mitsuba and of glTF, and '{scene}' is "
-                             "none: leave it out")
+            raise InputError(f"--sensor is for files of Mitsuba, glTF and Blender, and '{scene}' "
+                             "is none: leave it out")
         return catalog.load(str(scene))
     texts = {str(name): _text(value) for name, value in (define or {}).items()}
     loaded = scene_of_file(Path(scene), texts, sensor)

@@ -165,7 +165,7 @@ def test_the_library_reads_files_and_refuses_what_is_for_others(tmp_path):
             (path, {"sensor": 1}, "there is no sensor 1: use --sensor 0 to 0"),
             (path, {"define": {"a": 1}}, "is for Mitsuba's XML files"),
             (tmp_path / "no.glb", {}, "there is no scene file '.*no.glb': there is no such file"),
-            ("box", {"sensor": 1}, "sensor is for files of Mitsuba and of glTF, and 'box'"))
+            ("box", {"sensor": 1}, "sensor is for files of Mitsuba, glTF and Blender, and 'box'"))
     for wrong, options, sentence in cases:
         with pytest.raises((InputError, SceneError), match=sentence) as caught:
             onespp.load(wrong, **options)
