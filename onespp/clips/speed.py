@@ -69,8 +69,9 @@ def _rate(folder: Path | str, options: dict[str, Any], kind: str, count: int, se
 def read(folder: str, options: dict[str, Any], kind: str, first: int, step: int, begin: float,
          seconds: float) -> float:
     """Clips a second of this process, of every `step`-th one from `first` on, in turns."""
-    clips = Clips(folder, **{key: tuple(value) if isinstance(value, list) else value
-                             for key, value in options.items()})
+    given: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value
+                             for key, value in options.items()}  # JSON has no tuples
+    clips = Clips(folder, **given)
     one = clips.__getitem__ if kind == "clips" else _decoding(clips, folder)
     one(first % len(clips))
     time.sleep(max(0.0, begin - time.time()))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from typing import Any
 
 import pytest
 
@@ -12,7 +13,7 @@ from onespp.clips import speed
 from onespp.clips.store import Store
 from onespp.render.errors import InputError
 
-OPTIONS = {"frames": 1, "crop": 16}
+OPTIONS: dict[str, Any] = {"frames": 1, "crop": 16}
 
 
 def test_processes_read_different_clips_and_decoding_makes_none(made, monkeypatch):
