@@ -41,6 +41,7 @@ class Images:
 
     Attributes:
         rows: (registry indices) uint32, which row of images is in a shape, from 1; 0: none.
+        masks: (registry indices) uint32, 1 for shapes cut out by a mask.
         in_several: the row of what is seen in one after another. layered: whether anything lets
             light through.
 
@@ -60,6 +61,8 @@ class Images:
         self._mirrors = [by_name[names[i]] for i in listed]
         self._planes = [_plane(shape) for shape in self._mirrors]
         self.layered = any(_lobes(shape) & _THROUGH for shape in shapes.values())
+        self.masks = np.zeros(max(shapes) + 1, np.uint32)
+        self.masks[[i for i, shape in shapes.items() if _is_mask(shape)]] = 1
         self.in_several = len(listed) + 1
         self.rows = np.zeros(max(shapes) + 1, np.uint32)
         self.rows[found] = self.in_several
@@ -126,6 +129,10 @@ def is_clear(shape: mi.Shape) -> bool:
     Of what Mitsuba has, those whose lobes can be asked for one by one (not blends, nor masks).
     """
     return not shape.is_emitter() and _only(shape.bsdf(), _CLEAR)
+
+
+def _is_mask(shape: mi.Shape) -> bool:
+    return shape.bsdf().class_name() == "MaskBSDF" and not shape.is_emitter()
 
 
 def _only(bsdf: mi.BSDF, kinds: tuple[str, ...]) -> bool:

@@ -181,6 +181,11 @@ class MitsubaScene:
         return aligned(mi.UInt32, self.images.rows)
 
     @cached_property
+    def masks(self) -> mi.UInt32:
+        """Which shapes are cut out by masks, by registry index."""
+        return aligned(mi.UInt32, self.images.masks)
+
+    @cached_property
     def appearance(self) -> Appearance:
         """What its materials say of themselves."""
         return Appearance({_registry_index(s): s.bsdf() for s in self.mi_scene.shapes()})

@@ -39,7 +39,10 @@ def albedo(hit: PrimaryHit) -> mi.Color3f:
     value = hit.stage.appearance.albedo(hit.si)
     if hit.behind is None:
         return value
-    return dr.select(dr.all(value == 1), value, value * dr.minimum(hit.behind.throughput, 1))
+    left = dr.minimum(hit.behind.throughput, 1)
+    if hit.behind.opacity is not None:
+        left *= hit.behind.opacity
+    return dr.select(dr.all(value == 1), value, value * left)
 
 
 def normal(hit: PrimaryHit) -> mi.Vector3f:
@@ -68,11 +71,15 @@ def object_id(hit: PrimaryHit) -> mi.Int32:
 
 
 def roughness(hit: PrimaryHit) -> mi.Float:
-    """Alpha; 0 too where the only specular light is another layer's, of glass before a surface."""
+    """Alpha; 0 too where the only specular light is an image: a layer's, but no mask's own."""
     value = hit.stage.appearance.roughness(hit.si)
     if hit.behind is None or hit.behind.other is None:
         return value
-    return dr.select((value == 1) & (dr.max(hit.behind.other.throughput) > 0), 0, value)
+    other = hit.behind.other
+    is_image = dr.max(other.throughput) > 0
+    if other.opacity is not None:
+        is_image &= other.opacity == 1
+    return dr.select((value == 1) & is_image, 0, value)
 
 
 GBUFFER: dict[str, Callable[[PrimaryHit], mi.Float | mi.Vector3f | mi.Color3f | mi.Int32]] = {

@@ -77,7 +77,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     hit_distance, hit_shape, hit_face = mi.Float(0), mi.UInt32(0), mi.UInt32(0)
     arrived = mi.Color3f(0)  # direct light, but for what purely specular lobes reflect
     beta, eta = mi.Color3f(1), mi.Float(1)
-    depth, longest = mi.UInt32(0), max_depth
+    depth, longest, opacity = mi.UInt32(0), max_depth, None
     previous_p = mi.Point3f(0)
     bsdf_pdf = mi.Float(1)
     from_delta = mi.Bool(True)
@@ -85,6 +85,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     if dr.hint(behind is not None, mode="scalar"):
         assert behind is not None
         beta, longest = mi.Color3f(behind.throughput), max_depth - behind.before
+        opacity = behind.opacity
 
     split = None
     if dr.hint(lights is not None, mode="scalar"):
@@ -113,8 +114,16 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
             smooth &= depth > 0
             arrived += dr.select((depth == 1) & ~from_delta, found, 0)
         sought = beta * sought_light(scene, si, sampler, candidates, smooth)
-        bsdf_sample, bsdf_weight = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(),
-                                               inner)
+        lobe = sampler.next_1d()
+        if dr.hint(opacity is not None, mode="scalar"):  # of a mask's lobes, the surface's alone
+            lobe *= dr.select(depth == 0, opacity, 1)
+        bsdf_sample, bsdf_weight = bsdf.sample(context, si, lobe, sampler.next_2d(), inner)
+        if dr.hint(opacity is not None, mode="scalar"):
+            assert opacity is not None
+            masked = inner & (depth == 0) & (opacity < 1)
+            bsdf_weight *= dr.select(masked, opacity, 1)
+            bsdf_sample.pdf = dr.select(masked, bsdf.pdf(context, si, bsdf_sample.wo, masked),
+                                        bsdf_sample.pdf)
 
         emission += dr.select(depth == 0, found, 0)
         direct += dr.select(depth == 1, found, 0) + dr.select(depth == 0, sought, 0)

@@ -110,7 +110,9 @@ class Renderer(View):
             images, seen, row, behind = self.stage.images, ray, None, None
             if images.any:
                 behind = replaced(scene, ray, pi, sampler, self.scene.max_depth,
-                                  self.stage.image_rows, images.layered)
+                                  self.stage.image_rows,
+                                  self.stage.masks if images.masks.any() else None,
+                                  images.layered)
                 seen, pi, row = behind.ray, behind.pi, behind.row(self.stage)
             planes = {}
             if set(channels) & _TRACED:

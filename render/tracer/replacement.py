@@ -26,9 +26,11 @@ behind the surface over that before it; d, the ray's direction from the camera.
 A bent surface's image is only nearly at rest when the camera moves (that depends on the angle, and
 differs along and across), which is what methods have to bear with.
 
+A mask of opacity o lets 1 - o through. Below 1/2 the ray goes on; the surface, with o, is the other
+layer. From there on it is the pixel's surface, and what is behind it is the other.
+
 The mean of a frame is what it was: what is followed is not random, and of the layers left aside one
-is picked in proportion to its luminance. (A mask that is neither open nor closed is as any surface
-here: its paths go through or not by chance, and the guides are its own.)
+is picked in proportion to its luminance.
 
 Source: Zimmer et al. 2015, "Path-space motion estimation and decomposition for robust animation
 filtering", section 4; lengths by the paraxial equations of a spherical mirror and of a refracting
@@ -57,12 +59,14 @@ class Layer:
     """A ray that leaves a pixel's chain of surfaces, and what of its light the pixel shows.
 
     throughput: 0 where there is none, over the probability of its having been picked. before:
-    segments before it.
+    segments before it. opacity: of the mask that it meets first, 1 where that is to be met by
+    chance as others are; None if there are no masks.
     """
 
     ray: mi.Ray3f
     throughput: mi.Color3f
     before: mi.UInt32
+    opacity: mi.Float | None
 
 
 @dataclass
@@ -72,7 +76,8 @@ class Replaced:
     ray, pi: the last segment, and its hit. throughput: of the surfaces before. before: segments
     before the last. length: of the image from the camera, in stage units. columns: of H. images:
     the shape that it is an image in, its index in the JIT registry, 0 for none; several: whether
-    there is another. other: what else is seen there, if anything in the scene is clear.
+    there is another. opacity: of a mask that the surface is cut out by, else 1; None if there are
+    no masks. other: what else is seen there, if anything in the scene is clear.
     """
 
     ray: mi.Ray3f
@@ -83,6 +88,7 @@ class Replaced:
     columns: tuple[mi.Vector3f, mi.Vector3f, mi.Vector3f]
     images: mi.UInt32
     several: mi.Bool
+    opacity: mi.Float | None
     other: Layer | None
 
     def unfolded(self, v: mi.Vector3f) -> mi.Vector3f:
@@ -97,12 +103,13 @@ class Replaced:
 
 @dr.syntax
 def replaced(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
-             max_depth: int, rows: mi.UInt32, layered: bool) -> Replaced:
+             max_depth: int, rows: mi.UInt32, masks: mi.UInt32 | None,
+             layered: bool) -> Replaced:
     """The surfaces behind mirrors and glass, of rays and their first hits.
 
     Args:
         sampler: advanced if `layered`. max_depth: longest path in segments, those before the
-            surface included. rows, layered: of `Images`.
+            surface included. rows, masks, layered: of `Images`.
     """
     reflect, through = mi.BSDFContext(), mi.BSDFContext()
     reflect.type_mask, through.type_mask = mi.BSDFFlags.DeltaReflection, _THROUGH
@@ -112,7 +119,8 @@ def replaced(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, s
     x, y, z = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0), mi.Vector3f(0, 0, 1)
     a, b, c, e = mi.Float(1), mi.Float(0), mi.Float(0), mi.Float(1)  # s -> (a s + b) / (c s + e)
     along = mi.Float(0)
-    other = Layer(mi.Ray3f(ray), mi.Color3f(0), mi.UInt32(0))
+    opacity = None if masks is None else mi.Float(1)
+    other = Layer(mi.Ray3f(ray), mi.Color3f(0), mi.UInt32(0), opacity)
     total, picked = mi.Float(0), mi.Float(1)
     left = mi.Float(0)
     if dr.hint(layered, mode="scalar"):
@@ -127,24 +135,35 @@ def replaced(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, s
         sample, weight = bsdf.sample(reflect, si, 0.5, mi.Point2f(0.5), is_clear)
         wo, eta, passes = mi.Vector3f(sample.wo), mi.Float(1), mi.Bool(False)
         if dr.hint(layered, mode="scalar"):
-            is_hole = active & ~is_clear & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null)
-            is_hole &= dr.min(bsdf.eval_null_transmission(si, is_hole)) >= 1
+            is_mask, o = mi.Bool(False), mi.Float(1)
+            if dr.hint(masks is not None, mode="scalar"):
+                is_mask = active & (dr.gather(mi.UInt32, masks, shape, active) != 0)
+                is_clear &= ~is_mask
+                o = dr.select(is_mask, 1 - dr.mean(bsdf.eval_null_transmission(si, is_mask)), 1)
+                opacity = dr.select(is_mask & (o >= 0.5), o, opacity)
+            is_hole = is_mask & (o < 0.5)
             beyond, share = bsdf.sample(through, si, 0.5, mi.Point2f(0.5), is_clear)
             passes = is_hole | (dr.max(share) > dr.max(weight))
-            rest = throughput * dr.select(is_hole, 0, dr.select(passes, weight, share))
-            aside = si.spawn_ray(si.to_world(dr.select(passes, sample.wo, beyond.wo)))
-            brightness = dr.select(active & (is_clear | is_hole), mi.luminance(rest), 0)
+            rest = throughput * dr.select(is_mask, dr.select(is_hole, 1, 1 - o),
+                                          dr.select(passes, weight, share))
+            aside = si.spawn_ray(si.to_world(dr.select(
+                is_mask, -si.wi, dr.select(passes, sample.wo, beyond.wo))))
+            aside = dr.select(is_hole, ray, aside)
+            brightness = dr.select(is_clear | is_mask, mi.luminance(rest), 0)
+            brightness *= dr.select(is_hole, o, 1)
             total += brightness
             chance = dr.select(total > 0, brightness / total, 0)
             taken = left < chance
             other.ray = dr.select(taken, aside, other.ray)
             other.throughput = dr.select(taken, rest, other.throughput)
-            other.before = dr.select(taken, before + 1, other.before)
+            other.before = dr.select(taken, dr.select(is_hole, before, before + 1), other.before)
+            if dr.hint(masks is not None, mode="scalar"):
+                other.opacity = dr.select(taken, dr.select(is_hole, o, 1), other.opacity)
             picked = dr.select(taken, brightness, picked)
             left = dr.select(taken, left / chance, (left - chance) / dr.maximum(1 - chance, 1e-9))
             left = dr.clip(left, 0, 1 - 2.0**-24)
             wo = dr.select(is_hole, -si.wi, dr.select(passes, beyond.wo, wo))
-            weight = dr.select(is_hole, 1, dr.select(passes, share, weight))
+            weight = dr.select(is_hole, 1 - o, dr.select(passes, share, weight))
             eta = dr.select(passes & ~is_hole, beyond.eta, 1)
             is_clear |= is_hole
         active &= is_clear & (dr.max(weight) > 0)
@@ -177,7 +196,7 @@ def replaced(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, s
     length = dr.fma(a, pi.t, b) / dr.fma(c, pi.t, e)
     length = dr.select((length > 0) & (length < _FARTHEST * plain), length, plain)
     other.throughput *= dr.select(total > 0, total / picked, 0)
-    return Replaced(ray, pi, throughput, before, length, (x, y, z), images, several,
+    return Replaced(ray, pi, throughput, before, length, (x, y, z), images, several, opacity,
                     other if layered else None)
 
 

@@ -204,7 +204,7 @@ MATERIALS = {
     "principled coated": (disney(0.5, clearcoat=1.0, clearcoat_gloss=0.9), 0.25),
     "principled two-sided": (twosided(disney(0.6)), 0.36),
     "principled thin": ({"type": "principledthin", "roughness": 0.5}, 0.25),
-    "mask of chalk": (masked(twosided(DIFFUSE)), 1.0),
+    "mask of chalk": (masked(twosided(DIFFUSE)), 0.0),  # of what is seen through it
     "mask of metal": (masked(conductor(0.3)), 0.3),
     "mask of plastic": (masked(twosided(plastic(0.1))), 0.1),
     "mask of principled": (masked(disney(0.5), 0.9), 0.25),
@@ -258,7 +258,7 @@ ALBEDOS = {
     "blend with a mirror": (blend(MIRROR, CHALK, 0.25), 0.25),
     "blend with plastic": (twosided(blend(CHALK, plastic(0.1, **PAINT))), 1.0),
     "bumpy blend": (wavy(blend(CHALK, conductor(0.1), 0.5)), 0.5),
-    "mask of a blend": (masked(blend(CHALK, conductor(0.1), 0.5)), 0.5),
+    "mask of a blend": (masked(blend(CHALK, conductor(0.1), 0.5), 1.0), 0.5),
     "half a metal": (disney(base_color=(0.2, 0.3, 0.4), metallic=0.5), 0.5),
     "half a glass": (disney(base_color=(0.2, 0.3, 0.4), metallic=0.2, spec_trans=0.5), 0.4),
     "chalk before metal": ({"type": "twosided", "a": CHALK, "b": conductor(0.1)}, 1.0),

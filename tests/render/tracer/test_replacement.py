@@ -11,7 +11,7 @@ from onespp.render.channels import FRAME, GLOSS
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Disk, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.hard import HARD
-from onespp.scenes.materials import checks, cutout, diffuse, glass, mirror, pane
+from onespp.scenes.materials import checks, cutout, diffuse, glass, mirror, pane, varnish
 from onespp.scenes.meshes import box
 from onespp.scenes.transforms import look_at, rotate, scale, translate
 from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
@@ -160,11 +160,21 @@ def test_what_is_behind_a_pane_or_a_hole_is_itself():
         assert (left == 1).all() if name == "holes" else ((left < 0.95) & (left > 0.8)).all()
 
 
-@pytest.mark.parametrize("name", ["moving-mirror", "glass-ball", "foliage"])
+def veils() -> Scene:
+    """Varnish and glass of many opacities, one behind the other."""
+    half = {"type": "checkerboard", "color0": 0.3, "color1": 0.8}
+    materials = (varnish((0.6, 0.3, 0.1)), glass(), diffuse((0.2, 0.5, 0.7)))
+    return Scene("veils", "for a test", (FLOOR, BALL, LAMP, *(
+        Shape(f"veil {i}", Rectangle(), {"type": "mask", "opacity": half, "bsdf": material},
+              translate((0.3 * i, 1, 0.9 + 0.4 * i)) @ rotate(Y, 12 * i))
+        for i, material in enumerate(materials))), CAMERA, 6, W, H)
+
+
+@pytest.mark.parametrize("name", ["moving-mirror", "glass-ball", "veils"])
 def test_frames_have_the_mean_of_the_reference(name):
     """Which goes through all of it by chance."""
-    renderer = Renderer(replace(HARD[name].make(), max_depth=6), 24, 36, direct="resampled",
-                        sampler="zsobol")
+    scene = veils() if name == "veils" else HARD[name].make()
+    renderer = Renderer(replace(scene, max_depth=6), 24, 36, direct="resampled", sampler="zsobol")
     ours = [renderer.frame(4, seed, ("color",))["color"] for seed in range(100)]
     reference = [renderer.sample_sum(4, 9, k, 32) / 32 for k in range(16)]
     a, b = (mean_and_variance([blocks(image, 6) for image in i]) for i in (ours, reference))
@@ -177,6 +187,23 @@ def test_what_glass_reflects_is_specular_light_of_its_own():
     assert both.sum() > 50
     assert frame["specular"][both].mean() > 0
     assert np.all(frame["specular"] <= frame["indirect"] + 1e-6)
+
+
+@pytest.mark.parametrize("opacity", [0.3, 0.7])
+def test_a_mask_is_looked_through_below_a_half(opacity):
+    veil = Shape("veil", Rectangle(), {"type": "mask", "opacity": opacity, "bsdf": diffuse(
+        (0.2, 0.5, 0.1))}, translate((0, 1, 1.5)) @ scale(2))
+    (frame, names), (plain, _) = seen(veil), seen()
+    ball = at_image(plain["id"] == 0)
+    assert ball.sum() > 10
+    if opacity < 0.5:
+        assert (frame["id"][ball] == 0).all()
+        np.testing.assert_allclose(frame["albedo"][ball], 0.7 * plain["albedo"][ball], rtol=1e-3)
+    else:
+        assert (frame["id"][ball] == names.index("veil")).all()
+        np.testing.assert_allclose(frame["albedo"][ball], np.tile((0.14, 0.35, 0.07), (
+            ball.sum(), 1)), rtol=2e-3)
+    assert frame["specular"][ball].mean() > 0
 
 
 def test_scenes_without_such_surfaces_have_no_images():
