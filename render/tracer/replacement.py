@@ -93,8 +93,7 @@ class Replaced:
 
     def unfolded(self, v: mi.Vector3f) -> mi.Vector3f:
         """H v: a direction at the surface, as the image has it."""
-        x, y, z = self.columns
-        return dr.fma(x, v.x, dr.fma(y, v.y, z * v.z))
+        return _combined(*self.columns, v)
 
     def row(self, stage: MitsubaScene) -> mi.UInt32:
         """Of `Images`: which images it is among."""
@@ -170,8 +169,9 @@ def replaced(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, s
 
         if active:
             throughput *= weight
-            t = pi.t
             onward = si.to_world(wo)
+            leaving = si.spawn_ray(onward)  # a little off the surface
+            t = dr.dot(leaving.o - ray.o, ray.d)
             k = _curvature(si)
             p, q = dr.select(passes, eta, 1), dr.select(passes, (1 - eta) * k, 2 * k)
             a, b, c, e = (dr.fma(a, dr.fma(t, q, 1), b * q), p * dr.fma(a, t, b),
@@ -188,7 +188,7 @@ def replaced(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, s
             several |= is_image & (images != 0) & (images != shape)
             images = dr.select(is_image & (images == 0), shape, images)
             before += 1
-            ray = si.spawn_ray(onward)
+            ray = leaving
             pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
             active &= pi.is_valid() & (before + 1 < max_depth)
 

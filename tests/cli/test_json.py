@@ -15,7 +15,7 @@ from onespp.scenes.hard import HARD
 from tests.support.made_sequence import make_sequence
 
 WITHOUT = {"dataset", "render", "denoise", "run", "report", "view", "import", "export", "new",
-           "completion"}
+           "completion", "train"}
 """Commands whose outcome is files."""
 
 

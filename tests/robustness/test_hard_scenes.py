@@ -25,6 +25,8 @@ from tests.support.frames import with_images
 from .hard_numbers import pixel_errors
 
 HEIGHT, WIDTH, FRAMES = 16, 24, (3, 4, 5, 6, 9)
+BENT = {"glass-ball", "window"}
+BEHIND = {"mirror", "moving-mirror", "thin-glass", "foliage"}
 REPLAYED = {"cut", "switched-on", "mirror", "shrinks", "sky"}
 each_scene = pytest.mark.parametrize("name", HARD)
 
@@ -114,14 +116,19 @@ def test_a_hard_scene_renders_to_finite_images_and_a_finite_reference(name):
 
 @each_scene
 def test_every_pixel_lies_on_the_object_whose_id_it_has(name):
-    """With a normal that faces the camera. What is scaled to nothing is not there."""
+    """With a normal that faces the camera. What is scaled to nothing is not there. (Images are
+    objects. Behind mirrors and panes rays begin a little off them; glass that bends puts what it
+    shows elsewhere.)"""
+    slack = 10 if name in BEHIND else 1
     scene, (frames, _) = HARD[name].make(), rendered(name)
     for frame in frames:
         matrices = camera_matrices(scene.camera, frame.index, HEIGHT, WIDTH)
         np.testing.assert_array_equal(frame.screen_from_world, matrices.screen_from_world)
         seen = 0
-        for i, shape in enumerate(scene.shapes):
-            place = shape.world_from_object_at(frame.index)
+        for i, place in enumerate(frame.world_from_object):
+            shape = scene.shapes[i % len(scene.shapes)]
+            if i < len(scene.shapes):
+                np.testing.assert_array_equal(place, shape.world_from_object_at(frame.index))
             rows, columns = np.nonzero(frame["id"] == i)
             if np.linalg.det(place) == 0:
                 assert not rows.size, shape.name
@@ -134,21 +141,22 @@ def test_every_pixel_lies_on_the_object_whose_id_it_has(name):
             toward_camera = np.linalg.inv(frame.camera_from_world)[:3, 3] - (
                 place @ np.vstack([local, np.ones(rows.size)]))[:3].T
             assert (np.sum(toward_camera * frame["normal"][rows, columns], -1) > 0).all()
-            assert on_surface(shape.geometry, local).all(), (shape.name, frame.index)
+            on_it = on_surface(shape.geometry, local, slack)
+            assert name in BENT or on_it.all(), (shape.name, frame.index)
         assert seen == (frame["id"] >= 0).sum()
         assert (frame["depth"][frame["id"] >= 0] > 0).all()
 
 
-def on_surface(geometry, local):
+def on_surface(geometry, local, slack=1):
     """Whether points (3, n) of an object's own space lie on it; meshes: in its bounding box."""
     match geometry:
         case Sphere():
-            return abs(np.linalg.norm(local, axis=0) - 1) < 2e-4
+            return abs(np.linalg.norm(local, axis=0) - 1) < 2e-4 * slack
         case Rectangle():
-            return (abs(local[:2]) < 1 + 1e-3).all(0) & (abs(local[2]) < 1e-3)
+            return (abs(local[:2]) < 1 + 1e-3 * slack).all(0) & (abs(local[2]) < 1e-3 * slack)
         case Mesh():
             low, high = geometry.vertices.min(0)[:, None], geometry.vertices.max(0)[:, None]
-            return ((local > low - 1e-3) & (local < high + 1e-3)).all(0)
+            return ((local > low - 1e-3 * slack) & (local < high + 1e-3 * slack)).all(0)
 
 
 def test_a_scene_far_away_tiny_or_huge_looks_as_it_does_at_the_origin():

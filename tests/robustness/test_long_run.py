@@ -55,7 +55,7 @@ def kernels_of(function):
 
 
 @pytest.mark.parametrize("name", METHODS)
-@pytest.mark.parametrize("count", [120, pytest.param(2000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [200, pytest.param(2000, marks=pytest.mark.slow)])
 def test_a_long_still_scene_neither_drifts_nor_grows(name, count):
     if not has_history(name) or (name in LEARNED and count == 200):  # whose frames take long
         count = WARM + 20

@@ -20,9 +20,8 @@ from onespp.render.tracer.sampler import REFERENCE_STREAM, Sobol, keys_from_seed
 from onespp.scenes import catalog
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.transforms import look_at, rotate, scale, translate
+from tests.render.tracer.test_renderer import gray
 from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
-
-from .test_renderer import gray
 
 BLACK = {"type": "diffuse", "reflectance": 0.0}
 HEIGHT, WIDTH, BLOCK = 12, 16, 4

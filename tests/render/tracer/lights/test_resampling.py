@@ -14,9 +14,8 @@ from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.path import LARGEST_VISIBILITY, Radiance, _with_split
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
+from tests.render.tracer.test_renderer import small_scene
 from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
-
-from .test_renderer import small_scene
 
 
 @pytest.mark.parametrize("name", ["box", "room"])
