@@ -170,8 +170,9 @@ def replaced(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, s
         if active:
             throughput *= weight
             onward = si.to_world(wo)
-            leaving = si.spawn_ray(onward)  # a little off the surface
+            leaving = si.spawn_ray(onward)  # a little off the surface, which a mirror reverses
             t = dr.dot(leaving.o - ray.o, ray.d)
+            t = dr.select(passes, t, 2 * pi.t - t)
             k = _curvature(si)
             p, q = dr.select(passes, eta, 1), dr.select(passes, (1 - eta) * k, 2 * k)
             a, b, c, e = (dr.fma(a, dr.fma(t, q, 1), b * q), p * dr.fma(a, t, b),
