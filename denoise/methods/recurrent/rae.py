@@ -11,8 +11,8 @@ frame's surfaces; input and result are planes of
 
 Source: Chaitanya et al. 2017, "Interactive Reconstruction of Monte Carlo Image Sequences using a
 Recurrent Denoising Autoencoder", doi:10.1145/3072959.3073601. The weights are ours: a network with
-a quarter of the published features, trained by `onespp train rae` on two cores, for less than an hour. What
-it scores says nothing about the paper's.
+a quarter of the published features, trained by `onespp train rae` on two cores, for less than an
+hour. What it scores says nothing about the paper's.
 
 Departures:
 - Light is compressed by g, in the input, the result and the loss. The paper has a loss on L^0.2,
