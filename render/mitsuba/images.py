@@ -60,9 +60,9 @@ class Images:
         listed = sorted(by_size[:most], key=names.__getitem__)
         self._mirrors = [by_name[names[i]] for i in listed]
         self._planes = [_plane(shape) for shape in self._mirrors]
-        self.layered = any(_lobes(shape) & _THROUGH for shape in shapes.values())
         self.masks = np.zeros(max(shapes) + 1, np.uint32)
         self.masks[[i for i, shape in shapes.items() if _is_mask(shape)]] = 1
+        self.layered = bool(self.masks.any()) or any(not only_mirrors(shapes[i]) for i in found)
         self.in_several = len(listed) + 1
         self.rows = np.zeros(max(shapes) + 1, np.uint32)
         self.rows[found] = self.in_several

@@ -181,9 +181,9 @@ class MitsubaScene:
         return aligned(mi.UInt32, self.images.rows)
 
     @cached_property
-    def masks(self) -> mi.UInt32:
-        """Which shapes are cut out by masks, by registry index."""
-        return aligned(mi.UInt32, self.images.masks)
+    def masks(self) -> mi.UInt32 | None:
+        """Which shapes are cut out by masks, by registry index; None if none is."""
+        return aligned(mi.UInt32, self.images.masks) if self.images.masks.any() else None
 
     @cached_property
     def appearance(self) -> Appearance:

@@ -107,12 +107,9 @@ class Renderer(View):
             ray, depth_per_length = rays.at(*self.centres(pixel))
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
             sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
-            images, seen, row, behind = self.stage.images, ray, None, None
-            if images.any:
-                behind = replaced(scene, ray, pi, sampler, self.scene.max_depth,
-                                  self.stage.image_rows,
-                                  self.stage.masks if images.masks.any() else None,
-                                  images.layered)
+            seen, row, behind = ray, None, None
+            if self.stage.images.any:
+                behind = replaced(self.stage, ray, pi, sampler)
                 seen, pi, row = behind.ray, behind.pi, behind.row(self.stage)
             planes = {}
             if set(channels) & _TRACED:

@@ -47,6 +47,7 @@ from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 
 from .lights.resampling import shape_index
+from .lights.reservoir import offered
 from .sampler import Sampler
 
 _THROUGH = +mi.BSDFFlags.DeltaTransmission | +mi.BSDFFlags.Null
@@ -101,15 +102,15 @@ class Replaced:
 
 
 @dr.syntax
-def replaced(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
-             max_depth: int, rows: mi.UInt32, masks: mi.UInt32 | None,
-             layered: bool) -> Replaced:
+def replaced(stage: MitsubaScene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f,
+             sampler: Sampler) -> Replaced:
     """The surfaces behind mirrors and glass, of rays and their first hits.
 
     Args:
-        sampler: advanced if `layered`. max_depth: longest path in segments, those before the
-            surface included. rows, masks, layered: of `Images`.
+        stage: has images. sampler: advanced if they are layered.
     """
+    scene, max_depth = stage.mi_scene, stage.description.max_depth
+    rows, masks, layered = stage.image_rows, stage.masks, stage.images.layered
     reflect, through = mi.BSDFContext(), mi.BSDFContext()
     reflect.type_mask, through.type_mask = mi.BSDFFlags.DeltaReflection, _THROUGH
     ray, pi = mi.Ray3f(ray), mi.PreliminaryIntersection3f(pi)
@@ -151,16 +152,13 @@ def replaced(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, s
             brightness = dr.select(is_clear | is_mask, mi.luminance(rest), 0)
             brightness *= dr.select(is_hole, o, 1)
             total += brightness
-            chance = dr.select(total > 0, brightness / total, 0)
-            taken = left < chance
+            taken, left = offered(left, brightness, total)
             other.ray = dr.select(taken, aside, other.ray)
             other.throughput = dr.select(taken, rest, other.throughput)
             other.before = dr.select(taken, dr.select(is_hole, before, before + 1), other.before)
             if dr.hint(masks is not None, mode="scalar"):
                 other.opacity = dr.select(taken, dr.select(is_hole, o, 1), other.opacity)
             picked = dr.select(taken, brightness, picked)
-            left = dr.select(taken, left / chance, (left - chance) / dr.maximum(1 - chance, 1e-9))
-            left = dr.clip(left, 0, 1 - 2.0**-24)
             wo = dr.select(is_hole, -si.wi, dr.select(passes, beyond.wo, wo))
             weight = dr.select(is_hole, 1 - o, dr.select(passes, share, weight))
             eta = dr.select(passes & ~is_hole, beyond.eta, 1)

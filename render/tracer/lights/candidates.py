@@ -26,6 +26,7 @@ from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.sampler import Sampler
 
 from .resampling import power_heuristic
+from .reservoir import offered
 
 GOLDEN = 0.6180339887498949  # fractional part; its multiples spread evenly over [0, 1)
 FEWEST, MOST = 2, 8
@@ -65,12 +66,7 @@ def sought_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
         c = dr.select(active & (light.pdf != 0), w * value * weight, 0)
         luminance = mi.luminance(c)
         total += luminance
-        share = dr.select(total > 0, luminance / total, 0)
-        taken = choice < share
-        # What is left of the random number is uniform again.
-        choice = dr.select(taken, choice / share,
-                           (choice - share) / dr.maximum(1 - share, 1e-9))
-        choice = dr.clip(choice, 0, 1 - 2.0**-24)
+        taken, choice = offered(choice, luminance, total)
         kept = dr.select(taken, c, kept)
         kept_luminance = dr.select(taken, luminance, kept_luminance)
         place = dr.select(taken, light.p, place)

@@ -44,6 +44,8 @@ import drjit as dr
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.sampler import Sampler
 
+from .reservoir import offered
+
 DELTA = 0.1
 _DIMMEST = 1e-6  # share of l(U): a group that gives less has no visibility
 
@@ -130,13 +132,9 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
             by_group = added(by_group, group, c)
         luminance = mi.luminance(c)
         total += luminance
-        share = dr.select(total > 0, luminance / total, 0)
-        taken = left < share
+        taken, left = offered(left, luminance, total)
         picked = dr.select(taken, k, picked)
         picked_luminance = dr.select(taken, luminance, picked_luminance)
-        # What is left of the random number is uniform again.
-        left = dr.select(taken, left / share, (left - share) / dr.maximum(1 - share, 1e-9))
-        left = dr.clip(left, 0, 1 - 2.0**-24)
         k += 1
 
     dark = total <= 0

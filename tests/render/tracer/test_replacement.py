@@ -137,6 +137,25 @@ def test_images_in_a_ball_are_where_the_paraxial_equations_say(material, place, 
     assert frame["depth"][4, 4] == pytest.approx(eye - r + image(s, r), rel=5e-3)
 
 
+def test_normals_behind_glass_turn_as_light_does():
+    """Behind one surface of glass, at 30 degrees: by Snell's law, in float64."""
+    camera = Camera(look_at((0, 0, 4), (0, 0, 0)), fov=2)
+    tilted = rotate(Y, 30)
+    wall = Shape("wall", Rectangle(), diffuse((0.5, 0.5, 0.5)), translate((0, 0, -3)) @ scale(9))
+    scene = Scene("snell", "for a test", (Shape("glass", Rectangle(), glass(), tilted), wall, LAMP),
+                  camera, 1, 9, 9, 6)
+    frame = Renderer(scene, 9, 9).frame(0)
+    d, m = np.array([0, 0, -1.0]), tilted[:3, 2]
+    cosine, eta = -d @ m, 1.5 / 1.000277  # of air, as Mitsuba has it
+    onward = d / eta + (cosine / eta - np.sqrt(1 - (1 - cosine**2) / eta**2)) * m
+    v = np.cross(onward, d)
+    cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    turn = np.eye(3) + cross + cross @ cross / (1 + onward @ d)
+    assert frame["id"][4, 4] == 2
+    np.testing.assert_allclose(frame["normal"][4, 4], turn @ (0, 0, 1), atol=1e-5)
+    assert abs(frame["normal"][4, 4, 0]) > 0.1
+
+
 def test_what_is_behind_a_pane_or_a_hole_is_itself():
     """Its ID, its place but for what the pane's glass shifts it by, and its matrices."""
     plain, _ = seen()
@@ -219,6 +238,22 @@ def test_images_have_names_of_their_own():
     _, names = seen(odd, Shape("mirror", Rectangle(), mirror(), translate((0, 1, -1))))
     assert len(set(names)) == len(names) == 5 * 3
     assert {"ball in mirror", "ball in mirror'"} < set(names)
+
+
+def test_no_more_images_than_a_methods_tables_are_for():
+    """The largest mirrors have rows of their own; what is in the others is "in several"."""
+    balls = [Shape(f"mirror {i:02}", Sphere(), mirror(), translate((i - 10, 1, -1))
+                   @ scale(0.2 + 0.01 * i)) for i in range(20)]
+    _, names = seen(*balls)
+    assert len(names) == 23 * (1 + 16 + 1)
+    assert {"ball in mirror 04", "ball in mirror 19", "ball in several"} < set(names)
+    assert "ball in mirror 03" not in names
+
+
+def test_blends_with_glass_are_met_by_chance():
+    half = {"type": "blendbsdf", "weight": 0.5, "a": glass(), "b": diffuse((0.5, 0.5, 0.5))}
+    scene = Scene("seen", "for a test", (FLOOR, LAMP, Shape("it", Sphere(), half)), CAMERA, 1, W, H)
+    assert not Renderer(scene, 8, 8).stage.images.any
 
 
 def test_channels_of_gloss_come_with_glass_and_not_with_mirrors():
