@@ -137,6 +137,26 @@ def paint(mesh: Mesh, u: float, v: float = 0.5) -> Mesh:
     return Mesh(mesh.vertices, mesh.faces, mesh.normals, np.tile([u, v], (len(mesh.vertices), 1)))
 
 
+def box_mapped(mesh: Mesh) -> Mesh:
+    """The mesh with the uv of a box around it: seen along the axis that a face faces most.
+
+    uv is in units of the longest edge of all, as `box` has it. A vertex between faces of different
+    axes becomes several.
+    """
+    vertices = mesh.vertices
+    a, b, c = (vertices[mesh.faces[:, i]] for i in range(3))
+    axis = np.abs(np.cross(b - a, c - a)).argmax(axis=1)  # of each face
+    corners = 3 * mesh.faces.astype(np.int64) + axis[:, None]
+    kept, faces = np.unique(corners, return_inverse=True)
+    of, seen_along = kept // 3, kept % 3
+    low = vertices[of].min(axis=0)
+    longest = float((vertices[of].max(axis=0) - low).max()) or 1.0
+    inside = (vertices[of] - low) / longest
+    uv = np.take_along_axis(inside, np.array([(2, 1), (0, 2), (0, 1)])[seen_along], axis=1)
+    return Mesh(vertices[of], faces.reshape(-1, 3), None if mesh.normals is None
+                else mesh.normals[of], uv)
+
+
 def _extent(size: Vector) -> np.ndarray:
     extent = np.asarray(size, float)
     if extent.shape != (3,) or not (extent > 0).all():

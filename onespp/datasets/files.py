@@ -1,8 +1,8 @@
-"""Scenes of the user's own files in a data set: all looked at when it is begun, then drawn from.
+"""The user's own scenes and meshes in a data set: all looked at when it is begun, then drawn from.
 
 A file's scene is seen from somewhere on the orbit about what its camera looks at, and the camera
 moves from there; one that moves already is left alone. What moves in a file does so from a drawn
-frame on. Its light is as it is.
+frame on. Its light is as it is. A mesh is a thing among others; without uv it gets those of a box.
 
 A file is known by a hash of its bytes, and of those of all meshes, pictures and files that it
 names, not by where it is.
@@ -14,21 +14,28 @@ import hashlib
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from onespp.render.errors import InputError
+from onespp.render.files.atomic import read_bytes
 from onespp.render.host.turns import turn
 from onespp.render.scene_files.loaded import Loaded
 from onespp.render.scene_of_file import scene_of_file
 from onespp.scenes.animation import Animation
-from onespp.scenes.description import Camera, Scene, SceneError
+from onespp.scenes.description import Camera, Mesh, Scene, SceneError
 from onespp.scenes.drawn.choices import FILES
 from onespp.scenes.drawn.draw import Drawn, Request, dealt
+from onespp.scenes.drawn.things import footing
+from onespp.scenes.meshes import box_mapped
 
+from .patterns import MESHES
 from .plan import Plan
+
+_MESHES_KEPT = 64
 
 
 def opened(plan: Plan, tell: Callable[[str], None] = lambda sentence: None) -> Plan:
@@ -42,13 +49,17 @@ def opened(plan: Plan, tell: Callable[[str], None] = lambda sentence: None) -> P
             same as one that is not.
     """
     contents: dict[str, str] = {}
-    for name in dict.fromkeys((*plan.draw.files, *plan.held_out.files)):
+    for name in plan.named:
+        if name.lower().endswith(MESHES):
+            contents[name] = _hash(Path(plan.folder, name))
+            _mesh(Path(plan.folder, name), contents[name])
+            continue
         loaded = scene_of_file(Path(plan.folder, name))
         contents[name] = _content(loaded)
         if loaded.unused:
             tell(f"of {name} is not used: {loaded.unused}")
-    out = {contents[name]: name for name in plan.held_out.files}
-    for name in plan.draw.files:
+    out = {contents[name]: name for name in (*plan.held_out.files, *plan.held_out.meshes)}
+    for name in (*plan.draw.files, *plan.draw.meshes):
         other = out.get(contents[name], name)
         if other != name:
             raise InputError(f"{name} is the same file as {other}, which is held out: hold both "
@@ -66,9 +77,7 @@ def drawn_of_file(plan: Plan, request: Request) -> Drawn:
     name = dealt(r.choices.files, r, "file")
     loaded = scene_of_file(Path(plan.folder, name))
     content = _content(loaded)
-    if content != plan.contents.get(name, content):
-        raise InputError(f"{Path(plan.folder, name)}, or a file that it names, has changed since "
-                         "the data set was begun: put it back")
+    _require_unchanged(plan, name, content)
     random = np.random.default_rng((r.seed, r.number, r.attempt, 6))
     first = int(random.integers(max(1, loaded.scene.frames - r.frames + 1)))
     scene = _from_frame(loaded.scene, first)
@@ -84,11 +93,47 @@ def drawn_of_file(plan: Plan, request: Request) -> Drawn:
         "first": first, "light": "its own", "camera": move, **view, "things": [], "lamps": []})
 
 
+def mesh_of(plan: Plan, name: str) -> Mesh:
+    """The mesh of one of the plan's files, with uv.
+
+    Raises:
+        SceneError: it cannot be read. InputError: it has changed.
+    """
+    path = Path(plan.folder, name)
+    content = _hash(path)
+    _require_unchanged(plan, name, content)
+    return _mesh(path, content)
+
+
+@lru_cache(maxsize=_MESHES_KEPT)
+def _mesh(path: Path, content: str) -> Mesh:
+    """content: of the file; a changed one is read again."""
+    from onespp.render.scene_files.geometry import mesh_of_file  # imports Mitsuba
+
+    with turn():
+        mesh = mesh_of_file(path)
+    try:
+        footing(mesh)
+    except SceneError as error:
+        raise SceneError(f"{path} cannot stand among the things of a scene: {error}") from None
+    return mesh if mesh.uv is not None else box_mapped(mesh)
+
+
+def _require_unchanged(plan: Plan, name: str, content: str) -> None:
+    if content != plan.contents.get(name, content):
+        raise InputError(f"{Path(plan.folder, name)}, or a file that it names, has changed since "
+                         "the data set was begun: put it back")
+
+
 def _content(loaded: Loaded) -> str:
     """A hash of what a scene was read from."""
     main, *others = (hashlib.sha256(path.read_bytes()).hexdigest() for path in loaded.files
                      if path.is_file())
     return hashlib.sha256(" ".join([main, *sorted(others)]).encode()).hexdigest()[:16]
+
+
+def _hash(path: Path) -> str:
+    return hashlib.sha256(read_bytes(path)).hexdigest()[:16]
 
 
 def _from_frame(scene: Scene, first: int) -> Scene:

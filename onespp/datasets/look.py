@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from onespp.scenes.description import Mesh, Scene
 from onespp.scenes.drawn.choices import FILES
 from onespp.scenes.drawn.draw import Drawn, draw, family_of
 
-from .files import drawn_of_file
+from .files import drawn_of_file, mesh_of
 from .plan import Plan
 
 MOST_ATTEMPTS = 20
@@ -60,7 +61,8 @@ def usable(plan: Plan, number: int) -> Usable:
     rejected: list[str] = []
     for attempt in range(MOST_ATTEMPTS):
         request = plan.request(number, attempt)
-        drawn = (drawn_of_file(plan, request) if family_of(request) == FILES else draw(request))
+        drawn = (drawn_of_file(plan, request) if family_of(request) == FILES
+                 else draw(request, partial(mesh_of, plan)))
         job = _job(plan, number, drawn.scene)
         why = inside(drawn, job.frames) or unlike_a_picture(drawn, _seen(job))
         if why is None:

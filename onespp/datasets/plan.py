@@ -24,7 +24,7 @@ from onespp.scenes.description import LARGEST_SIDE, MOST_FRAMES, SceneError
 from onespp.scenes.drawn.choices import Choices, HeldOut
 from onespp.scenes.drawn.draw import Request, spread
 
-from .patterns import names_of
+from .patterns import READ, names_of
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -99,6 +99,12 @@ class Plan(JsonFile):
         return self
 
     @property
+    def named(self) -> tuple[str, ...]:
+        """All files in `draw` and `held_out`."""
+        return tuple(dict.fromkeys((*self.draw.files, *self.held_out.files, *self.draw.meshes,
+                                    *self.held_out.meshes)))
+
+    @property
     def key(self) -> str:
         """A hash of all that a sequence follows from."""
         text = self.model_dump_json(exclude={"sequences", "about", "licence", "folder"})
@@ -167,12 +173,14 @@ def changed(values: dict[str, Any], changes: Mapping[str, Any], what: str, folde
     for key, value in changes.items():
         _change(values, key, value)
     plan = checked_plan(values, what)
-    if not plan.draw.files and not plan.held_out.files:
+    if not plan.named:
         return plan
     values = plan.model_dump(mode="json", exclude_none=True)
     folder = (folder / plan.folder).resolve()
-    for table, patterns in (("draw", plan.draw.files), ("held_out", plan.held_out.files)):
-        values[table]["files"] = names_of(patterns, folder, f"{what}, {table}.files,")
+    for table in ("draw", "held_out"):
+        for kind, suffixes in READ.items():
+            values[table][kind] = names_of(values[table][kind], folder,
+                                           f"{what}, {table}.{kind},", suffixes)
     return checked_plan({**values, "folder": folder.as_posix()}, what)
 
 

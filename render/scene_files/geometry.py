@@ -110,6 +110,18 @@ class Geometries:
         return self._meshes[key]
 
 
+def mesh_of_file(path: Path) -> Mesh:
+    """The mesh of an OBJ or a PLY file: all its triangles as one, without its materials.
+
+    Raises:
+        SceneError: it cannot be read, or is no mesh.
+    """
+    try:
+        return _read(path.suffix.lower()[1:], {"filename": str(path)}, False)
+    except (RuntimeError, SceneError) as error:
+        raise SceneError(f"{path} cannot be used as a mesh: {plain(error)}") from None
+
+
 def _read(plugin: str, options: dict[str, Any], flipped: bool) -> Mesh:
     mesh = mi.load_dict({"type": plugin, **options})
     arrays = mi.traverse(mesh)

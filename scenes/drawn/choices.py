@@ -10,7 +10,7 @@ from onespp.scenes.description import SceneError
 
 Family = Literal["room", "window", "ground", "corner", "hall", "columns", "files"]
 Object = Literal["crate", "ball", "vase", "ring", "block", "goblet", "sheet", "stack", "egg",
-                 "hoop", "drum", "cone", "bowl", "pawn"]
+                 "hoop", "drum", "cone", "bowl", "pawn", "mesh"]
 Material = Literal["plain", "checks", "varnish", "wood", "metal", "weave", "grain", "polished",
                    "varnished wood", "mirror", "glass"]
 Light = Literal["panels", "unequal", "close", "changing", "sun", "overcast", "night"]
@@ -20,6 +20,9 @@ CameraMove = Literal["still", "orbit", "dolly", "handheld", "cut"]
 FILES = "files"
 """The family of scenes that are read from the user's own files, with the light that is in them."""
 PLACES: tuple[Family, ...] = tuple(family for family in get_args(Family) if family != FILES)
+MESH = "mesh"
+"""The kind of objects that are read from the user's own files, made as large as the others."""
+OBJECTS: tuple[Object, ...] = tuple(kind for kind in get_args(Object) if kind != MESH)
 LIGHTS_OF: dict[str, tuple[str, ...]] = {
     "room": ("panels", "unequal", "close", "changing"),
     "window": ("sun", "panels", "overcast", "changing"),
@@ -40,19 +43,21 @@ class Choices:
         families: of places. objects, materials, lights, motions, cameras: names of kinds; a name
             that is there twice is drawn twice as often.
         files: names of scene files (in a plan file: patterns), for the family "files".
+        meshes: names of OBJ and PLY files, likewise, for the object "mesh".
         things: fewest and most of them. speed: of things and cameras, 1: as `generated/` scenes.
         exposure: stops, 0: neither dark nor blown (`generated/exposure.py`).
         sharp: mirrors and glass among small lamps too, whose light in them references find late.
 
     Raises:
         SceneError: a list without names, a range that is empty or out of bounds, a family that
-            none of the lights suits, nothing but glass and mirrors to make things of, or files
-            without their family or the reverse.
+            none of the lights suits, nothing but glass and mirrors to make things of, files
+            without their family or meshes without their object, or the reverse.
     """
 
     families: tuple[Family, ...] = PLACES
     files: tuple[str, ...] = ()
-    objects: tuple[Object, ...] = get_args(Object)
+    objects: tuple[Object, ...] = OBJECTS
+    meshes: tuple[str, ...] = ()
     materials: tuple[Material, ...] = get_args(Material)
     lights: tuple[Light, ...] = get_args(Light)
     motions: tuple[Motion, ...] = get_args(Motion)
@@ -76,12 +81,8 @@ class Choices:
                 raise SceneError(f"none of the lights suits the family '{family}': add one of "
                                  f"{', '.join(LIGHTS_OF[family])}")
         require_plain_material(self.materials, "materials")
-        if FILES in self.families and not self.files:
-            raise SceneError("families has 'files', and there are none: name some, as files = "
-                             "[\"models/*.glb\"], hold fewer of them out, or leave the family out")
-        if self.files and FILES not in self.families:
-            raise SceneError("there are files, and families has no 'files': add it, as families = "
-                             "[\"room\", \"files\"], or leave the files out")
+        _require_both(self.families, "families", FILES, self.files, "files", "room", "*.glb")
+        _require_both(self.objects, "objects", MESH, self.meshes, "meshes", "crate", "*.obj")
 
     def lights_of(self, family: str) -> tuple[str, ...]:
         """The chosen lights that suit a family."""
@@ -95,12 +96,14 @@ class HeldOut:
     Attributes:
         families: of which the test split's places are, if there are any. objects, materials: each
             thing of the test split is of one of these objects, or of one of these materials.
-        files: those that the test split shows, as places of the family "files".
+        files: those that the test split shows, as places of the family "files". meshes: count as
+            objects.
     """
 
     families: tuple[Family, ...] = ()
     files: tuple[str, ...] = ()
     objects: tuple[Object, ...] = ()
+    meshes: tuple[str, ...] = ()
     materials: tuple[Material, ...] = ()
 
     def __post_init__(self) -> None:
@@ -115,9 +118,10 @@ class HeldOut:
         """
         kept = {name: tuple(kind for kind in getattr(choices, name)
                             if kind not in getattr(self, name))
-                for name in ("families", "files", "objects", "materials")}
-        return replace(choices, **{**kept, "files": kept["files"] if FILES in kept["families"]
-                                   else ()})
+                for name in ("families", "files", "objects", "meshes", "materials")}
+        return replace(choices, **{**kept,
+                                   "files": kept["files"] if FILES in kept["families"] else (),
+                                   "meshes": kept["meshes"] if MESH in kept["objects"] else ()})
 
     def alone(self, choices: Choices) -> Choices:
         """The choices with these families and files in place of theirs, where there are any.
@@ -130,6 +134,17 @@ class HeldOut:
             families += tuple(family for family in choices.families if family == FILES)
         files = self.files or choices.files
         return replace(choices, families=families, files=files if FILES in families else ())
+
+
+def _require_both(kinds: Sequence[str], title: str, kind: str, names: Sequence[str], what: str,
+                  other: str, pattern: str) -> None:
+    """SceneError where a kind is drawn from files of which there are none, or the reverse."""
+    if kind in kinds and not names:
+        raise SceneError(f"{title} has '{kind}', and there are none: name some, as {what} = "
+                         f"[\"models/{pattern}\"], hold fewer of them out, or leave '{kind}' out")
+    if names and kind not in kinds:
+        raise SceneError(f"there are {what}, and {title} has no '{kind}': add it, as {title} = "
+                         f"[\"{other}\", \"{kind}\"], or leave the {what} out")
 
 
 def require_plain_material(materials: Sequence[str], name: str) -> None:

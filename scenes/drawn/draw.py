@@ -9,13 +9,13 @@ of Weyl 1916). All else comes from a random generator of (seed, number, attempt)
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
-from onespp.scenes.description import Scene
+from onespp.scenes.description import Mesh, Scene
 from onespp.scenes.generated import exposure, lights
 from onespp.scenes.generated.plan import Plan
 from onespp.scenes.materials import diffuse
@@ -77,8 +77,12 @@ def spread(number: int, step: float = _GOLDEN, start: float = 0.5) -> float:
     return (start + number * step) % 1
 
 
-def draw(request: Request) -> Drawn:
-    """The scene; of a place, no file (`family_of`)."""
+def _no_mesh(name: str) -> Mesh:
+    raise LookupError(name)
+
+
+def draw(request: Request, mesh_of: Callable[[str], Mesh] = _no_mesh) -> Drawn:
+    """The scene; of a place, no file (`family_of`). mesh_of: reads a name of `choices.meshes`."""
     r, choices = request, request.choices
     family = family_of(r)
     light = dealt(choices.lights_of(family), r, "light")
@@ -90,7 +94,7 @@ def draw(request: Request) -> Drawn:
     draft = Plan(r.number, PLACE_OF[family], light, move, ground, wall, tuple(colors), key,
                  r.frames)
     stage = stage_of(draft, family)
-    found, free = things(draft, choices, r.held_out, speed)
+    found, free = things(draft, choices, r.held_out, speed, mesh_of)
     rig = exposure.exposed(lights.rig(draft, stage, free), stage, r.frames, stops)
     scene = Scene(
         name=f"{r.name}/{r.number}",

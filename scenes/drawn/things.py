@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from onespp.scenes.animation import Animation, compose
-from onespp.scenes.description import Shape
+from onespp.scenes.description import Mesh, SceneError, Shape
 from onespp.scenes.generated import motions, objects, surfaces
 from onespp.scenes.generated.objects import Body, Free
 from onespp.scenes.generated.plan import Plan
 from onespp.scenes.meshes import lathe, place
 from onespp.scenes.transforms import rotate, scale, translate
 
-from .choices import CLOSED, Choices, HeldOut
+from .choices import CLOSED, MESH, Choices, HeldOut
 
 _ACTIVE = ("spline", "bounce", "slide", "stop and go")
 _PROFILES = {  # (radius, height) of 1, from below on the outside
@@ -30,7 +31,7 @@ _FLATTER = {"bowl": 0.5, "drum": 0.8}
 
 @dataclass(frozen=True)
 class Thing:
-    """A thing, and what it was drawn to be."""
+    """A thing, and what it was drawn to be; object: a kind, or the name of a mesh's file."""
 
     shape: Shape
     object: str
@@ -38,45 +39,59 @@ class Thing:
     motion: str
 
 
-def things(draft: Plan, choices: Choices, held_out: HeldOut | None,
-           speed: float) -> tuple[list[Thing], Free]:
+def things(draft: Plan, choices: Choices, held_out: HeldOut | None, speed: float,
+           mesh_of: Callable[[str], Mesh]) -> tuple[list[Thing], Free]:
     """The scene's things, and the ground that they take, motions included.
 
     Args:
         held_out: None, or kinds of objects and of materials of which each thing has one.
+        mesh_of: reads a file of the object "mesh".
+
+    Raises:
+        SceneError: a mesh has no size.
     """
     random = draft.random("things")
     free, found = Free([]), []
     for i in range(int(random.integers(choices.things[0], choices.things[1] + 1))):
-        kinds = kinds_of_thing(random, choices, held_out, choices.sharp or draft.lamps_are_found)
+        kind, material = kinds_of_thing(random, choices, held_out,
+                                        choices.sharp or draft.lamps_are_found)
         move = choices.motions[random.integers(len(choices.motions))]
-        thing = _thing(random, draft, i, *kinds, move, speed, free)
+        mesh = mesh_of(kind) if kind in _meshes(choices, held_out) else None
+        thing = _thing(random, draft, i, kind if mesh is None else MESH, material, move, speed,
+                       free, mesh)
         if thing is not None:
-            found.append(thing)
+            found.append(replace(thing, object=kind))
     return found, free
 
 
 def kinds_of_thing(random: np.random.Generator, choices: Choices, held_out: HeldOut | None,
                    sharp: bool) -> tuple[str, str]:
-    """An object and a material that it may be of; sharp: a mirror or glass too."""
-    objects_, materials = choices.objects, choices.materials
+    """An object, or the name of a mesh, and a material that it may be of; sharp: a mirror or
+    glass too."""
+    objects_, meshes, materials = choices.objects, choices.meshes, choices.materials
     if held_out is not None:
         by_object = bool(random.random() < 0.5)
-        if held_out.objects and (by_object or not held_out.materials):
-            objects_ = held_out.objects
+        objects_held = held_out.objects + (MESH,) * bool(held_out.meshes)
+        if objects_held and (by_object or not held_out.materials):
+            objects_, meshes = objects_held, held_out.meshes or meshes
         elif held_out.materials:
             materials = held_out.materials
     kind = objects_[random.integers(len(objects_))]
     fit = [m for m in materials if (sharp or m not in ("mirror", "glass"))
            and (m != "glass" or kind in CLOSED)]
-    return kind, fit[random.integers(len(fit))]
+    material = fit[random.integers(len(fit))]
+    return meshes[random.integers(len(meshes))] if kind == MESH else kind, material
+
+
+def _meshes(choices: Choices, held_out: HeldOut | None) -> tuple[str, ...]:
+    return choices.meshes + (held_out.meshes if held_out is not None else ())
 
 
 def _thing(random: np.random.Generator, draft: Plan, i: int, kind: str, material: str, move: str,
-           speed: float, free: Free) -> Thing | None:
+           speed: float, free: Free, mesh: Mesh | None) -> Thing | None:
     """None where there is no room for it."""
-    made = _body(random, kind, random.uniform(0.7, 1.0) if move in _ACTIVE
-                 else random.uniform(0.8, 1.7))
+    size = random.uniform(0.7, 1.0) if move in _ACTIVE else random.uniform(0.8, 1.7)
+    made = _body(random, kind, size) if mesh is None else _standing(random, mesh, size)
     surface = surfaces.surface(random, material, draft.colors[i % len(draft.colors)],
                                draft.lamps_are_found)
     far = motions.reach(random, move)
@@ -97,6 +112,30 @@ def _thing(random: np.random.Generator, draft: Plan, i: int, kind: str, material
 
 def _faster(motion: Animation, speed: float) -> Animation:
     return Animation(lambda frame: motion(speed * frame))
+
+
+def _standing(random: np.random.Generator, mesh: Mesh, size: float) -> Body:
+    """A mesh of any size, y up, as large as other things."""
+    foot, around, tall = footing(mesh)
+    width, height = random.uniform(0.4, 0.6) * size, random.uniform(0.6, 1.0) * size
+    factor = width / around if tall * width <= height * around else height / tall
+    stand = translate((0, 0.001, 0)) @ scale(factor) @ translate(-foot)
+    return Body(mesh, stand, factor * around)
+
+
+def footing(mesh: Mesh) -> tuple[np.ndarray, float, float]:
+    """The point below the middle of a mesh's box, the radius about it, and the height.
+
+    Raises:
+        SceneError: it has no width to scale.
+    """
+    used = mesh.vertices[np.unique(mesh.faces)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    foot = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    around = float(np.hypot(*(used - foot)[:, [0, 2]].T).max())
+    if not around > 0 or not np.isfinite(1 / around):
+        raise SceneError("it has no width: all its vertices are above one point")
+    return foot, around, float(high[1] - low[1])
 
 
 def _body(random: np.random.Generator, kind: str, size: float) -> Body:

@@ -55,6 +55,11 @@ def test_each_thing_of_the_test_split_is_of_a_held_out_object_or_material():
     pairs = {kinds_of_thing(random, Choices(), held, True) for _ in range(200)}
     assert all((kind in held.objects) or (material in held.materials) for kind, material in pairs)
     assert len({kind for kind, _ in pairs}) == len(Choices().objects)  # others too, of weave
+    own = replace(Choices(), objects=("ball", "mesh"), meshes=("a.obj", "b.ply"))
+    of_meshes = HeldOut(meshes=("b.ply",))
+    assert {kinds_of_thing(random, own, of_meshes, True)[0] for _ in range(9)} == {"b.ply"}
+    assert of_meshes.left(own).meshes == ("a.obj",)
+    assert HeldOut(objects=("mesh",)).left(own).meshes == ()
     left = held.left(Choices())
     assert not {*left.objects} & {*held.objects}
     assert not {*left.materials} & {*held.materials}

@@ -8,6 +8,7 @@ import pytest
 from onespp.scenes.description import Mesh, SceneError
 from onespp.scenes.meshes import (
     box,
+    box_mapped,
     ellipsoid,
     lathe,
     merge,
@@ -150,3 +151,18 @@ def test_a_mesh_keeps_its_vertices_when_the_array_they_came_in_changes():
 def test_complex_vertices_are_refused():
     with pytest.raises(SceneError, match="mesh vertices are not real numbers"):
         Mesh(np.eye(3) + 1j, np.array([[0, 1, 2]]))
+
+
+def test_a_box_around_a_mesh_gives_it_uv_that_are_not_stretched():
+    bare = ellipsoid((1, 2, 0.5), 16)
+    mapped = box_mapped(Mesh(bare.vertices, bare.faces, bare.normals))
+    assert mapped.uv is not None
+    assert mapped.normals is not None
+    assert 0 <= mapped.uv.min() < 0.1 < 0.9 < mapped.uv.max() <= 1
+    corners = bare.vertices[bare.faces], mapped.vertices[mapped.faces]
+    assert np.array_equal(*corners)
+    assert np.array_equal(bare.normals[bare.faces], mapped.normals[mapped.faces])
+    edges = np.diff(corners[0], axis=1)
+    flat = np.abs(np.cross(edges[:, 0], edges[:, 1])).argmax(axis=1)  # the axis that is left out
+    seen = np.linalg.norm(np.where(np.arange(3) == flat[:, None, None], 0, edges), axis=2)
+    assert np.allclose(np.linalg.norm(np.diff(mapped.uv[mapped.faces], axis=1), axis=2), seen / 4)
