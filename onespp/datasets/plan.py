@@ -172,6 +172,8 @@ def changed(values: dict[str, Any], changes: Mapping[str, Any], what: str, folde
     """A plan of a TOML file's tables, some settings changed; files are from `folder`."""
     for key, value in changes.items():
         _change(values, key, value)
+    if changes:
+        what += f" with {', '.join(f'{key}={value}' for key, value in changes.items())}"
     plan = checked_plan(values, what)
     if not plan.named:
         return plan
@@ -193,7 +195,7 @@ def checked_plan(values: Mapping[str, Any], what: str) -> Plan:
     try:  # as JSON, where a list may be a tuple
         return Plan.model_validate_json(json.dumps(values, default=str))
     except ValidationError as error:
-        raise InputError(f"{what} {explain(error)}") from None
+        raise InputError(f"{what} {explain(error, 'correct it')}") from None
 
 
 def value_of(text: str) -> tuple[str, Any]:

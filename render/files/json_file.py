@@ -45,8 +45,11 @@ def format_json(model: JsonFile) -> str:
     return model.model_dump_json(indent=2) + "\n"
 
 
-def explain(error: ValidationError) -> str:
-    """The first of pydantic's complaints, as the end of a sentence that begins with the file."""
+def explain(error: ValidationError, remedy: str = "make it again") -> str:
+    """The first of pydantic's complaints, as the end of a sentence that begins with the file.
+
+    remedy: what to do where something is missing, or does not fit together.
+    """
     first = error.errors(include_url=False, include_input=False)[0]
     if first["type"] == "json_invalid":
         return f"is not valid JSON ({_line(first['msg'].removeprefix('Invalid JSON: '))})"
@@ -54,13 +57,14 @@ def explain(error: ValidationError) -> str:
     if first["type"] == "extra_forbidden":
         return f"has an unknown key '{_line(where)}': remove it, or use the version that wrote it"
     if first["type"] == "missing":
-        return f"lacks the key '{_line(where)}': make it again"
+        return f"lacks the key '{_line(where)}': {remedy}"
     message = first["msg"].removeprefix("Value error, ")
     if not where:
-        return f"does not hold what it should ({_line(message)}): make it again"
+        return f"does not hold what it should ({_line(message)}): {remedy}"
     return f"has an invalid '{_line(where)}' ({_line(message[:1].lower() + message[1:])})"
 
 
 def _line(text: str) -> str:
     """Text from a file, made fit for one line of a message."""
-    return "".join(c if c.isprintable() else "?" for c in text)[:300]
+    shown = "".join(c if c.isprintable() else "?" for c in text)
+    return shown if len(shown) <= 400 else f"{shown[:397]}..."

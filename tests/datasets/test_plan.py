@@ -70,7 +70,7 @@ def test_the_plan_of_the_documentation_can_be_used(tmp_path):
 
 
 @pytest.mark.parametrize(("text", "words"), [
-    ('name = "a"', "lacks the key 'sequences'"),
+    ('name = "a"', "lacks the key 'sequences': correct it"),
     ("name = ", "is not a TOML file"),
     ("[draw]\nthing = [1, 2]", "unknown key 'draw.thing'"),
     ("colour = 1", "unknown key 'colour'"),
