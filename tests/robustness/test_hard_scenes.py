@@ -214,7 +214,7 @@ def test_every_method_gives_finite_images_on_every_hard_scene(method):
     for name in HARD:
         frames, _ = rendered(name)
         state = start
-        for frame in (*frames[:3], frames[-1]):  # before, at and after what happens; after a gap
+        for frame in frames:
             image, state = denoiser(frame, state)
             assert np.isfinite(image).all(), (name, frame.index)
             assert np.abs(image).max() <= 2 * max(f["color"].max() for f in frames), name
