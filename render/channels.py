@@ -85,6 +85,14 @@ def _rgb(layer: str) -> tuple[str, ...]:
 
 
 MOST_GROUPS = 4  # of lights, each with a visibility of its own
+TRACING = 2
+"""Counts the changes of what frames hold. Raise it whenever the same scene, frame and seed give
+other values than rounding explains in any channel, of frames or references: sequences and data sets
+begun before are then not continued. One number serves both, since what changes the mean of light
+changes both, and more than one would let a folder hold frames that its references do not fit.
+
+2: the first surface behind mirrors, clear glass and masks is the pixel's (`tracer/replacement.py`).
+"""
 
 _ROWS = (
     Channel("color", Group.RADIANCE, ("R", "G", "B"), FLOAT, Display.LIGHT, 0.0,

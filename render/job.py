@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from onespp.render.channels import TRAINING
+from onespp.render.channels import TRACING, TRAINING
 from onespp.render.files.behind import writing_behind
 from onespp.render.files.json_file import checked
 from onespp.render.files.lock import when_free, writing
@@ -115,7 +115,7 @@ class RenderJob:
             later=later_fingerprints(self.scene, self.frames), frames=tuple(self.frames),
             width=self.width, height=self.height, fps=self.scene.fps,
             seed=self.seed, reference_spp=self.fewest_spp, max_depth=self.scene.max_depth,
-            direct=self.direct, sampler=self.sampler, jitter=self.jitter,
+            direct=self.direct, sampler=self.sampler, jitter=self.jitter, tracing=TRACING,
             reference_filter="box" if self.antialias else "centre",
             channels=self.channel_names(), half=self.half,
             objects=self.renderer.stage.images.names(),

@@ -56,7 +56,8 @@ def compare_references(truth: FrameSequence, others: list[FrameSequence],
     for other in others:
         key = first_difference(truth.manifest, other.manifest.model_copy(update={
             "seed": truth.manifest.seed, "reference_spp": truth.manifest.reference_spp,
-            "channels": truth.manifest.channels, "commands": truth.manifest.commands}))
+            "channels": truth.manifest.channels, "tracing": truth.manifest.tracing,
+            "commands": truth.manifest.commands}))
         if key:
             raise InputError(f"{other.folder} has another {key} than {truth.folder}: references "
                              "of the same frames can be compared, with other seeds and samples")

@@ -16,6 +16,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from onespp.render.channels import TRACING
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import explain, read_bytes, write_bytes, write_text
 from onespp.render.files.json_file import JsonFile, format_json, read_json
@@ -77,11 +78,13 @@ class Entry(JsonFile):
 class DataSetFile(JsonFile):
     """dataset.json: the plan, who rendered, and the sequences that were whole when it was written.
 
-    `drawing` is `scenes.drawn.draw.DRAWING` of the onespp that draws its scenes.
+    `drawing` is `scenes.drawn.draw.DRAWING` of the onespp that draws its scenes, `tracing`
+    `render.channels.TRACING` of the one that renders them.
     """
 
     format: Annotated[int, Field(ge=FORMAT, le=FORMAT)] = FORMAT
     drawing: int = 1
+    tracing: int = 1
     plan: Plan
     versions: dict[str, str]
     sequences: dict[int, Entry] = Field(default_factory=dict)
@@ -151,6 +154,10 @@ class DataSet:
                 if there.drawing != DRAWING:
                     raise InputError(f"{folder} has scenes that another version of onespp drew, "
                                      "and this one draws others: use another --out")
+                if there.tracing != TRACING:
+                    raise InputError(f"{folder} has frames that another version of onespp "
+                                     "rendered, and this one puts other values into them: use "
+                                     "another --out")
                 if there.plan.sequences >= plan.sequences:
                     plan = there.plan.model_copy(update={"folder": plan.folder})
                     if _stored(folder, plan) == there.plan:
@@ -160,8 +167,8 @@ class DataSet:
                 if folder.exists() and any(not p.name.startswith(".") for p in folder.iterdir()):
                     raise InputError(f"{folder} holds files that are no data set: use another "
                                      "--out")
-                written = DataSetFile(drawing=DRAWING, plan=_stored(folder, plan),
-                                      versions=dict(versions))
+                written = DataSetFile(drawing=DRAWING, tracing=TRACING,
+                                      plan=_stored(folder, plan), versions=dict(versions))
         except OSError as error:
             raise InputError(explain(folder, error)) from error
         with cls(folder, plan)._changing():
@@ -242,7 +249,7 @@ class DataSet:
 
     def verify(self, progress: Progress = silent) -> list[str]:
         """Read everything again; a sentence for each thing that is not as it was written."""
-        entries = read_json(self.folder / "dataset.json", DataSetFile).sequences
+        there = read_json(self.folder / "dataset.json", DataSetFile)
         wrong, numbers = [], self.numbers()
         missing = sorted({*range(self.plan.sequences)} - {*numbers})
         if missing:
@@ -253,13 +260,13 @@ class DataSet:
         for done, number in enumerate(numbers):
             progress(done, len(numbers), "verify", f"sequence {number}")
             try:
-                wrong += self._wrong(number, entries.get(number))
+                wrong += self._wrong(number, there.sequences.get(number), there.tracing)
             except InputError as error:
                 wrong.append(str(error))
         progress(len(numbers), len(numbers), "verify")
         return wrong
 
-    def _wrong(self, number: int, entry: Entry | None) -> Iterator[str]:
+    def _wrong(self, number: int, entry: Entry | None, tracing: int) -> Iterator[str]:
         place, made = self.place(number), self.made(number)
         assert made is not None
         if made.number != number:
@@ -274,7 +281,10 @@ class DataSet:
             if _part(place / name) != part:
                 yield f"{place / name} is not as it was written: remove {place} and make it again"
         for k in range(self.plan.seeds):
-            _ = read_json(place / f"seed{k}" / "manifest.json", Manifest)
+            if read_json(place / f"seed{k}" / "manifest.json", Manifest).tracing != tracing:
+                yield (f"{place}/seed{k} was rendered by another version of onespp than "
+                       f"{self.folder} is of, whose frames hold other values: remove {place} and "
+                       "make it again")
         if entry is not None and entry.digest != made.digest:
             yield f"{place} is not what {self.folder}/dataset.json lists: it was made anew since"
 

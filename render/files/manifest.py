@@ -38,7 +38,8 @@ Size = Annotated[int, Field(ge=1, le=1 << 16)]
 Name = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]+$")]
 
 
-_UNKNOWN = ("spp", "max_depth", "direct", "sampler", "jitter", "reference_filter")  # of an import
+_UNKNOWN = ("spp", "max_depth", "direct", "sampler", "jitter", "reference_filter",
+            "tracing")  # of an import
 
 
 class Manifest(JsonFile):
@@ -48,12 +49,14 @@ class Manifest(JsonFile):
     have), None where there is none; `reference_filter` is "centre" where samples go through pixel
     centres, as a frame's do, "box" where they are spread over the pixel.
     `jitter` says how far a frame's rays are from centres: "none", or "halton" for an offset a
-    frame, which its matrices contain. `seed`, `spp`, `max_depth`, `direct`, `sampler`, `jitter` and
-    `reference_filter` are None for imports, where nobody knows them (older versions wrote defaults
-    there, which are not read). `objects` are names in order of ID, `moving` those of them that have
-    matrices in the frames' files (the others stand still), None where all have. `fingerprint` is a
-    hash of what the scene describes (or an import holds), so that an edited scene is not taken for
-    the old one; `later` has hashes of frames after the scene's last one, by their number.
+    frame, which its matrices contain. `tracing` is `render.channels.TRACING` of the onespp that
+    made the frames, 1 of those that did not say. `seed`, `spp`, `max_depth`, `direct`, `sampler`,
+    `jitter`, `reference_filter` and `tracing` are None for imports, where nobody knows them (older
+    versions wrote defaults there, which are not read). `objects` are names in order of ID, `moving`
+    those of them that have matrices in the frames' files (the others stand still), None where all
+    have. `fingerprint` is a hash of what the scene describes (or an import holds), so that an
+    edited scene is not taken for the old one; `later` has hashes of frames after the scene's last
+    one, by their number.
     `commands` are the command lines that made it, as they were typed, in order; `machine` is that
     of the first.
     """
@@ -77,6 +80,7 @@ class Manifest(JsonFile):
     direct: Name | None = "mis"
     sampler: Name | None = "pcg"
     jitter: Literal["none", "halton"] | None = "none"
+    tracing: Annotated[int, Field(ge=1)] | None = 1
     channels: Annotated[tuple[str, ...], Field(min_length=1)]
     half: bool = False
     objects: Annotated[tuple[Name, ...], Field(min_length=1)]
@@ -120,7 +124,7 @@ class Manifest(JsonFile):
 
 # What two manifests of the same sequence have in common. The rest may change from run to run.
 _IDENTITY = ("source", "scene", "fingerprint", "width", "height", "fps", "seed", "spp",
-             "max_depth", "direct", "sampler", "jitter", "channels", "half", "objects")
+             "max_depth", "direct", "sampler", "jitter", "channels", "half", "objects", "tracing")
 
 
 def first_difference(a: Manifest, b: Manifest) -> str | None:

@@ -433,6 +433,9 @@ def _continued(folder: Path, old: Manifest, new: Manifest) -> Manifest:
         detail = f" ({a} there, {b} here)" if len(f"{a}{b}") < 100 else ""
         if key == "fingerprint":
             key, detail = "content", " (what it was made from has changed)"
+        elif key == "tracing":
+            key, detail = "kind of frames", (" (another version of onespp made them, and this one "
+                                             "puts other values into theirs)")
         raise InputError(another(folder, key, detail))
     frames = tuple(sorted({*old.frames, *new.frames}))
     with_references = old if new.reference_spp is None else new

@@ -118,12 +118,8 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         if dr.hint(opacity is not None, mode="scalar"):  # of a mask's lobes, the surface's alone
             lobe *= dr.select(depth == 0, opacity, 1)
         bsdf_sample, bsdf_weight = bsdf.sample(context, si, lobe, sampler.next_2d(), inner)
-        if dr.hint(opacity is not None, mode="scalar"):
-            assert opacity is not None
-            masked = inner & (depth == 0) & (opacity < 1)
-            bsdf_weight *= dr.select(masked, opacity, 1)
-            bsdf_sample.pdf = dr.select(masked, bsdf.pdf(context, si, bsdf_sample.wo, masked),
-                                        bsdf_sample.pdf)
+        if dr.hint(opacity is not None, mode="scalar"):  # (its density has the opacity in it)
+            bsdf_weight *= dr.select(depth == 0, opacity, 1)
 
         emission += dr.select(depth == 0, found, 0)
         direct += dr.select(depth == 1, found, 0) + dr.select(depth == 0, sought, 0)

@@ -12,6 +12,8 @@ import time
 import pytest
 
 from onespp.render.files.sequence import FrameSequence
+from onespp.scenes.catalog import SCENES
+from onespp.scenes.hard import HARD
 
 SCENE = '''
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
@@ -44,9 +46,12 @@ def refused(result, *words: str) -> None:
         assert word in error
 
 
-def test_scenes_are_listed_with_what_moves(call):
+def test_scenes_are_listed_with_what_moves_and_the_hard_ones_in_a_group_of_their_own(call):
     code, out, _ = call("scenes")
     assert code == 0
+    ordinary, hard, *_ = out.split("\n\n")
+    assert all(f"\n{name}: " in f"\n{ordinary}" for name in SCENES)
+    assert len(hard.splitlines()) == 1 + len(HARD)
     assert "box: " in out
     assert "20 frames of 512x512" in out
     assert "80 frames of 1280x720" in out

@@ -36,11 +36,11 @@ SLOW = pytest.mark.slow
     *(pytest.param(COMPARE, where, marks=SLOW) for where in (
         ">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-", "| true")),
     pytest.param(COMPARE, "2>/dev/full", marks=[FULL, SLOW])])
-def test_a_closed_stream_ends_no_job(folder, words, redirection):
+def test_a_closed_stream_ends_no_job(folder, call, words, redirection):
     scores = folder / "scores.json"
     scores.unlink(missing_ok=True)
     if words.startswith("compare"):
-        assert shell(f"score {folder} --no-pictures", "").returncode == 0
+        assert call("score", folder, "--no-pictures")[0] == 0
     done = shell(words.format(folder, scores.name), redirection)
     assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
     assert scores.exists()
@@ -64,14 +64,14 @@ def test_bad_input_still_says_so_by_its_exit_code(redirection, tmp_path):
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
 def test_output_that_finds_no_room_is_an_error(folder):
-    done = shell("scenes", ">/dev/full")
+    done = shell("denoise --list", ">/dev/full")
     assert done.returncode == 2
     assert done.stderr.startswith("onespp: the disk is full")
 
 
 def test_the_streams_are_given_back(call):
     before = sys.stdout, sys.stderr
-    assert call("scenes")[0] == 0
+    assert call("denoise", "--list")[0] == 0
     assert (sys.stdout, sys.stderr) == before
     assert not isinstance(sys.stdout, terminal._Output)
 

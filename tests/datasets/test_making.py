@@ -19,6 +19,7 @@ from onespp.api.datasets import preview
 from onespp.datasets import look, making
 from onespp.datasets.folder import DataSet, DataSetFile, Made
 from onespp.datasets.plan import Plan, changed_plan, read_plan
+from onespp.render.channels import TRACING
 from onespp.render.errors import InputError
 from onespp.render.files.frame_ranges import part_of
 from onespp.render.files.json_file import read_json
@@ -207,14 +208,29 @@ def test_parts_make_all_between_them():
             part_of(range(7), part)
 
 
-def test_scenes_of_another_drawing_are_not_mixed_in(plan, tmp_path):
+@pytest.mark.parametrize(("line", "words"), [
+    (f'  "drawing": {DRAWING},\n', "scenes that another version of onespp drew"),
+    (f'  "tracing": {TRACING},\n', "frames that another version of onespp rendered")])
+def test_what_another_version_draws_or_renders_is_not_mixed_in(plan, tmp_path, line, words):
+    """A file that does not say which is of the first."""
     DataSet.create(tmp_path / "d", plan, {})
     path = tmp_path / "d/dataset.json"
     text = path.read_text()
-    assert f'"drawing": {DRAWING}' in text
-    path.write_text(text.replace(f'"drawing": {DRAWING}', '"drawing": 1'))
-    with pytest.raises(InputError, match="another version of onespp drew"):
+    assert line in text
+    path.write_text(text.replace(line, ""))
+    with pytest.raises(InputError, match=words):
         DataSet.create(tmp_path / "d", plan, {})
+
+
+def test_frames_of_another_version_among_the_others_are_found(copy):
+    path = copy.place(1) / "seed0/manifest.json"
+    path.write_text(path.read_text().replace(f'"tracing": {TRACING}', f'"tracing": {TRACING + 1}'))
+    (said,) = copy.verify()
+    assert said.startswith(f"{path.parent} was rendered by another version of onespp")
+    for old in (copy.folder / "dataset.json", *copy.folder.glob("*/*/seed*/manifest.json")):
+        text = "".join(line for line in old.read_text().splitlines(True) if "tracing" not in line)
+        old.write_text(text)
+    assert copy.verify() == []  # all of the first
 
 
 def test_a_folder_holds_one_data_set_which_may_grow(quick, plan, tmp_path):

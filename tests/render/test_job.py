@@ -6,6 +6,7 @@ import threading
 
 import pytest
 
+from onespp.render.channels import TRACING
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import FrameSequence
 from onespp.render.job import RenderJob, render_sequence
@@ -35,6 +36,19 @@ def test_a_frame_is_written_while_the_next_is_rendered(tmp_path, monkeypatch):
     sequence = render_sequence(RenderJob(small_scene(), (0, 1, 2), 12, 12), tmp_path / "s")
     assert order == [0, 1, 2]
     assert all(sequence.frame_is_whole(i) for i in order)
+
+
+def test_what_another_version_began_is_read_and_not_continued(tmp_path):
+    """A manifest that does not say which is of the first."""
+    job = RenderJob(small_scene(), (0, 1, 2), 12, 12)
+    path = FrameSequence.create(tmp_path / "s", job.manifest()).folder / "manifest.json"
+    line = f'  "tracing": {TRACING},\n'
+    text = path.read_text()
+    assert line in text
+    path.write_text(text.replace(line, ""))
+    assert FrameSequence.open(tmp_path / "s").manifest.tracing == 1
+    with pytest.raises(InputError, match=r"another version of onespp made.*: use --overwrite"):
+        render_sequence(job, tmp_path / "s")
 
 
 def test_a_disk_that_refuses_a_frame_is_told_of_in_the_same_sentence(tmp_path, monkeypatch):

@@ -16,7 +16,7 @@ from onespp.render.channels import REPLAY
 from onespp.render.job import RenderJob, render_sequence
 from onespp.render.tracer.camera_rays import camera_matrices
 from onespp.render.tracer.renderer import Renderer
-from onespp.scenes.catalog import SCENES, load
+from onespp.scenes.catalog import load
 from onespp.scenes.description import Mesh, Rectangle, SceneError, Sphere
 from onespp.scenes.hard import HARD
 from onespp.scenes.hard.parts import EVENT
@@ -301,11 +301,3 @@ def test_judging_needs_references(tmp_path):
     sequence = render_sequence(RenderJob(scene, (0, 1), 8, 8), tmp_path)
     with pytest.raises(ValueError, match="lacks frame or reference 0"):
         judge(sequence, "cut", None, True)
-
-
-def test_the_list_of_scenes_has_the_hard_ones_in_a_group_of_their_own(call):
-    code, out, _ = call("scenes")
-    assert code == 0
-    ordinary, hard, *_ = out.split("\n\n")
-    assert all(f"\n{name}: " in f"\n{ordinary}" for name in SCENES)
-    assert len(hard.splitlines()) == 1 + len(HARD)

@@ -114,6 +114,13 @@ def test_the_camera_is_outside_of_everything(name: str):
                 assert np.linalg.norm(eye - middle) > radius + 0.3, shape.name
 
 
+def _disk(points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Centre and radius of a disk that holds points, seen from above."""
+    flat = points[:, (0, 2)]
+    middle = flat.mean(axis=0)
+    return middle, np.linalg.norm(flat - middle, axis=1).max()
+
+
 @every_scene
 def test_things_stand_apart_and_on_the_ground(name: str):
     """Bounding disks of what stands do not overlap, in any frame; nothing is below the ground."""
@@ -122,9 +129,11 @@ def test_things_stand_apart_and_on_the_ground(name: str):
         points = {s.name: points_of(s, frame) for s in things}
         assert all(p[:, 1].min() > -1e-6 for p in points.values())
         low = {key: p for key, p in points.items() if p[:, 1].min() < 0.8}
+        disks = {key: _disk(p) for key, p in low.items()}
         for a, p in low.items():
             for b, q in low.items():
-                if a < b:
+                (one, r), (other, s) = disks[a], disks[b]
+                if a < b and np.linalg.norm(one - other) < r + s + 0.02:
                     gap = np.linalg.norm((p[:, None] - q[None, ::3])[..., (0, 2)], axis=2).min()
                     assert gap > 0.02, (a, b, frame)
 

@@ -27,13 +27,14 @@ from onespp.denoise.metrics.image import (
 from onespp.denoise.metrics.tonemap import linear_from_srgb, srgb_from_linear
 
 HEIGHT, WIDTH = 48, 80
+NARROW = 32  # pixels, where many references are judged
 RATE = 1e-3  # chance that a correct estimator fails a whole table of levels
 
 
-def scene(seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def scene(width: int = WIDTH) -> tuple[np.ndarray, np.ndarray]:
     """Linear truth, dark to bright, and an image that is off by 0.02 to 0.06 on the display."""
-    y, x = np.mgrid[:HEIGHT, :WIDTH]
-    shown = np.stack([0.15 + 0.6 * x / WIDTH, 0.2 + 0.5 * y / HEIGHT, 0.4 + 0 * x], axis=-1)
+    y, x = np.mgrid[:HEIGHT, :width]
+    shown = np.stack([0.15 + 0.6 * x / width, 0.2 + 0.5 * y / HEIGHT, 0.4 + 0 * x], axis=-1)
     wrong = shown + 0.04 * np.sin(0.4 * x + 0.2 * y)[..., None] + 0.02
     return linear_from_srgb(shown), linear_from_srgb(wrong)
 
@@ -114,12 +115,12 @@ def test_the_square_of_the_energy_error_has_no_bias():
     assert energy(judged(truth, truth, 0.02, np.random.default_rng(0))).mean < 1e-6
 
 
-def steps(sigma: float, rng: np.random.Generator) -> Step:
+def steps(sigma: float, rng: np.random.Generator, width: int = WIDTH) -> Step:
     """Two frames of which the second is the first moved by three pixels, with other errors."""
-    truth, image = scene()
+    truth, image = scene(width)
     old, now = judged(truth, image, sigma, rng), judged(
         np.roll(truth, 3, axis=1), np.roll(truth, 3, axis=1) * 1.05, sigma, rng)
-    source = np.roll(np.arange(HEIGHT * WIDTH).reshape(HEIGHT, WIDTH), 3, axis=1)
+    source = np.roll(np.arange(HEIGHT * width).reshape(HEIGHT, width), 3, axis=1)
     source[:, :3] = NOWHERE
     carried = old.target.srgb_halves.apply(
         lambda i: i.reshape(-1, 3)[np.maximum(source, 0)])
@@ -165,7 +166,7 @@ def coverage(found: list[tuple[float, float]], wanted: float) -> float:
 @pytest.mark.parametrize("correlated", [False, True])
 def test_the_interval_holds_the_truth(measure, sigma, correlated):
     """In 90 to 99 % of 200 references of the same truth, for the same image."""
-    truth, image = scene()
+    truth, image = scene(NARROW)
     truth, image = 0.5 * truth, 0.5 * image  # nothing near the clip
     exact = measure(judged(truth, image, 0.0, np.random.default_rng(0))).mean
     found = [measure(judged(truth, image, sigma, np.random.default_rng([i, 5]), correlated))
@@ -177,7 +178,7 @@ def test_the_interval_holds_the_truth(measure, sigma, correlated):
 
 @pytest.mark.parametrize("scale", ["dB", "root"])
 def test_the_interval_of_a_sequence_holds_the_truth(scale):
-    truth, image = scene()
+    truth, image = scene(NARROW)
     shown = mse(srgb_from_linear(image), srgb_from_linear(truth))
     wanted = decibels(shown) if scale == "dB" else math.sqrt(shown)
     found = []
@@ -191,14 +192,14 @@ def test_the_interval_of_a_sequence_holds_the_truth(scale):
 
 @pytest.mark.parametrize("measure", [flicker_square, difference_square])
 def test_the_interval_of_a_change_holds_the_truth(measure):
-    wanted = measure(steps(0.0, np.random.default_rng(0))).mean
-    found = [measure(steps(0.03, np.random.default_rng([i, 6]))) for i in range(REPEATS)]
+    wanted = measure(steps(0.0, np.random.default_rng(0), NARROW)).mean
+    found = [measure(steps(0.03, np.random.default_rng([i, 6]), NARROW)) for i in range(REPEATS)]
     assert 0.9 <= coverage([(e.mean, math.sqrt(e.variance)) for e in found], wanted) <= 0.99
 
 
 def test_methods_on_the_same_halves_are_paired():
     """The error of a difference is that of the differences, far below either's own."""
-    truth, image = scene()
+    truth, image = scene(NARROW)
     better = truth + 0.9 * (image - truth)
     wanted = (mse(srgb_from_linear(image), srgb_from_linear(truth))
               - mse(srgb_from_linear(better), srgb_from_linear(truth)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import count
+from typing import Any
 from urllib.parse import parse_qs
 
 import numpy as np
@@ -17,6 +19,7 @@ from tests.support.report_sequence import COUNT, HEIGHT, METHODS, WIDTH, make_re
 
 READY = '#stage[data-ready="true"]'
 PATIENCE = 120_000  # ms; a slow machine is not a failure
+COUNTER = count()
 
 
 @pytest.fixture(scope="module")
@@ -33,20 +36,26 @@ def browser():
         yield browser
 
 
+def heard(context) -> tuple[Any, list[str]]:
+    """A new page, and what it complains of at any time."""
+    context.set_default_timeout(PATIENCE)
+    page, complaints = context.new_page(), []
+    page.on("console", lambda m: m.type == "error" and complaints.append(m.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("requestfailed", lambda request: complaints.append(f"failed: {request.url}"))
+    return page, complaints
+
+
 @pytest.fixture
 def opened(browser, report):
     """Opens the page in a window of its own; fails the test if the page complains at any time."""
     complaints, contexts = [], []
 
     def open_page(hash_: str = "", width: int = 1300, height: int = 900, **options):
-        context = browser.new_context(viewport={"width": width, "height": height},
-                                      reduced_motion="reduce", **options)
-        contexts.append(context)
-        context.set_default_timeout(PATIENCE)
-        page = context.new_page()
-        page.on("console", lambda m: m.type == "error" and complaints.append(m.text))
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("requestfailed", lambda request: complaints.append(f"failed: {request.url}"))
+        contexts.append(browser.new_context(viewport={"width": width, "height": height},
+                                            reduced_motion="reduce", **options))
+        page, said = heard(contexts[-1])
+        complaints.append(said)
         page.goto(report[2] + hash_)
         page.wait_for_selector(READY)
         return page
@@ -54,6 +63,36 @@ def opened(browser, report):
     yield open_page
     for context in contexts:
         context.close()
+    assert not any(complaints), complaints
+
+
+@pytest.fixture(scope="module")
+def window(browser, report):
+    page, complaints = heard(browser.new_context(viewport={"width": 1300, "height": 900},
+                                                 reduced_motion="reduce"))
+    page.goto(report[2])
+    page.wait_for_selector(READY)
+    yield page, complaints
+    page.context.close()
+
+
+@pytest.fixture
+def shown(window):
+    """Shows what an address says in a window that tests share (to open one takes two seconds);
+    what addresses do not hold is as the test before left it. Fails as `opened`."""
+    page, complaints = window
+    complaints.clear()
+
+    def show(hash_: str = ""):
+        page.evaluate("""hash => new Promise((resolve) => {
+            document.activeElement.blur();
+            addEventListener("hashchange", resolve, {once: true});
+            location.hash = hash;
+        })""", f"{hash_ or '#'}&unlike={next(COUNTER)}")  # ignored, but another address
+        page.wait_for_selector(READY)
+        return page
+
+    yield show
     assert complaints == []
 
 
@@ -89,8 +128,8 @@ def expected(image: np.ndarray, x: int, y: int) -> np.ndarray:
     return bytes_from_linear(image[y, x]).astype(int)
 
 
-def test_it_opens_and_draws_every_plot(opened):
-    page = opened()
+def test_it_opens_and_draws_every_plot(shown):
+    page = shown()
     for name in ("speed", "frames", "histogram", "class-db", "class-share"):
         assert page.locator(f"#plot-{name} svg .axes").count() == 1, name
         drawn = page.locator(f"#plot-{name} svg :is(.line, .marker)").count()
@@ -100,8 +139,8 @@ def test_it_opens_and_draws_every_plot(opened):
         "aria-label") == "Pareto front: rough, fine"
 
 
-def test_a_point_says_its_values_and_chooses_its_method(opened, report):
-    page = opened("#frame=1&a=input&b=fine")
+def test_a_point_says_its_values_and_chooses_its_method(shown, report):
+    page = shown("#frame=1&a=input&b=fine")
     point = page.locator('#plot-speed [aria-label^="rough"]')
     point.hover()
     value = f"{report[1].methods['rough']['psnr_srgb']:.2f} dB"
@@ -111,16 +150,19 @@ def test_a_point_says_its_values_and_chooses_its_method(opened, report):
     assert page.locator("#b").input_value() == "rough"
 
 
-def test_the_plots_follow_the_measure_and_the_legend(opened):
-    page = opened()
+def test_the_plots_follow_the_measure_and_the_legend(shown):
+    page = shown()
+    measure = page.locator("#metric").input_value()
     page.select_option("#metric", "relmse")
     assert "relMSE" in page.locator("#plot-speed").text_content()
     page.click('#legend button:has-text("fine")')
     assert page.locator("#plot-speed .marker").count() == len(METHODS) - 1
+    page.click('#legend button:has-text("fine")')
+    page.select_option("#metric", measure)
 
 
-def test_both_pictures_show_the_pixels_of_their_files(opened, report):
-    page = opened("#frame=2&a=rough&b=reference&split=0.5")
+def test_both_pictures_show_the_pixels_of_their_files(shown, report):
+    page = shown("#frame=2&a=rough&b=reference&split=0.5")
     sequence = report[0]
     box = page.evaluate("(() => { const s = document.getElementById('stage');"
                         " return [s.clientWidth, s.clientHeight]; })()")
@@ -132,8 +174,8 @@ def test_both_pictures_show_the_pixels_of_their_files(opened, report):
         assert np.abs(np.array(colour_at(page, left, top)) - expected(image, x, y)).max() <= 1
 
 
-def test_the_slider_moves_by_hand_and_by_key(opened):
-    page = opened("#frame=0&a=input&b=fine")
+def test_the_slider_moves_by_hand_and_by_key(shown):
+    page = shown("#frame=0&a=input&b=fine")
     stage = box_of(page, "#stage")
     middle = colour_at(page, 0.4, 0.5)
     handle = box_of(page, "#handle")
@@ -147,8 +189,8 @@ def test_the_slider_moves_by_hand_and_by_key(opened):
     assert page.locator("#handle").get_attribute("aria-valuenow") == "22"
 
 
-def test_frame_and_method_change_by_menu_and_key(opened, report):
-    page = opened("#frame=0&a=input&b=fine")
+def test_frame_and_method_change_by_menu_and_key(shown, report):
+    page = shown("#frame=0&a=input&b=fine")
     page.locator("#frame").fill("3")
     page.wait_for_selector('#stage[data-ready="true"][data-frame="3"]')
     page.select_option("#b", "rough")
@@ -166,8 +208,8 @@ def test_frame_and_method_change_by_menu_and_key(opened, report):
     assert page.locator("#handle").is_hidden()
 
 
-def test_every_channel_is_shown(opened):
-    page = opened("#frame=1&a=rough&b=rough")
+def test_every_channel_is_shown(shown):
+    page = shown("#frame=1&a=rough&b=rough")
     before = colour_at(page, 0.4, 0.5)
     for channel in ("error", "flip", "albedo", "normal", "position", "depth", "id"):
         page.select_option("#ca", channel)
@@ -177,8 +219,8 @@ def test_every_channel_is_shown(opened):
         assert channel in page.locator("#tag-a").inner_text()
 
 
-def test_the_pixel_under_the_pointer_is_read_out(opened, report):
-    page = opened("#frame=1&a=fine&b=reference&mode=side&zoom=8&x=24&y=16")
+def test_the_pixel_under_the_pointer_is_read_out(shown, report):
+    page = shown("#frame=1&a=fine&b=reference&mode=side&zoom=8&x=24&y=16")
     stage = box_of(page, "#stage")
     x, y = 22, 13
     page.mouse.move(stage["x"] + stage["width"] / 4 + 8 * (x + 0.5 - 24),
@@ -186,12 +228,12 @@ def test_the_pixel_under_the_pointer_is_read_out(opened, report):
     page.wait_for_function("document.getElementById('pixel').textContent.includes('·')")
     object_name = report[0].manifest.objects[report[0].read_frame(1)["id"][y, x]]
     assert page.locator("#pixel").inner_text() == f"x {x}, y {y} · {object_name}"
-    shown = [float(cell) for cell in page.locator("#pixels tr:first-child td").all_inner_texts()]
-    np.testing.assert_allclose(shown[:3], report[0].read_result("fine", 1)[y, x], rtol=0.01)
+    values = [float(cell) for cell in page.locator("#pixels tr:first-child td").all_inner_texts()]
+    np.testing.assert_allclose(values[:3], report[0].read_result("fine", 1)[y, x], rtol=0.01)
 
 
-def test_exposure_brightens_the_pictures(opened):
-    page = opened("#frame=0&a=reference&b=reference")
+def test_exposure_brightens_the_pictures(shown):
+    page = shown("#frame=0&a=reference&b=reference")
     before = sum(colour_at(page, 0.4, 0.5))
     page.locator("#ev").fill("2")
     page.wait_for_selector(READY)
@@ -215,15 +257,15 @@ def test_a_link_restores_the_view(opened):
     assert page.locator("#a").input_value() == "input"
 
 
-def test_nonsense_in_a_link_is_ignored(opened):
-    page = opened("#frame=99&a=<b>&b=none&zoom=-3&x=nan&ev=1e9&split=7")
+def test_nonsense_in_a_link_is_ignored(shown):
+    page = shown("#frame=99&a=<b>&b=none&zoom=-3&x=nan&ev=1e9&split=7")
     assert page.locator("#stage").get_attribute("data-frame") == str(COUNT // 2)
     assert page.locator("#zoom").inner_text() == "fit"
 
 
-def test_the_wheel_zooms_where_the_picture_has_the_focus_and_scrolls_elsewhere(opened):
+def test_the_wheel_zooms_where_the_picture_has_the_focus_and_scrolls_elsewhere(shown):
     """Events of our own: where a real pointer is after a scroll depends on the browser's pace."""
-    page = opened("#frame=0&a=input&b=fine")
+    page = shown("#frame=0&a=input&b=fine")
     wheel_is_taken = """() => !document.getElementById("canvas").dispatchEvent(
         new WheelEvent("wheel", {deltaY: -300, clientX: 300, clientY: 200, cancelable: true}))"""
     assert not page.evaluate(wheel_is_taken)
@@ -233,8 +275,8 @@ def test_the_wheel_zooms_where_the_picture_has_the_focus_and_scrolls_elsewhere(o
     page.wait_for_function("document.getElementById('zoom').textContent !== 'fit'")
 
 
-def test_it_plays_and_stops(opened):
-    page = opened("#frame=0&a=input&b=fine")
+def test_it_plays_and_stops(shown):
+    page = shown("#frame=0&a=input&b=fine")
     page.click("#play")
     page.wait_for_selector('#stage[data-frame="2"]')
     page.click("#play")
@@ -251,8 +293,8 @@ def test_it_plays_and_stops(opened):
     assert seen == 1
 
 
-def test_the_table_sorts_both_ways(opened, report):
-    page = opened()
+def test_the_table_sorts_both_ways(shown, report):
+    page = shown()
     names = "#table tbody th"
     psnr = {name: m["psnr_srgb"] for name, m in report[1].methods.items()}
     page.click('#table thead button:text-is("PSNR (dB)")')
@@ -264,17 +306,21 @@ def test_the_table_sorts_both_ways(opened, report):
 
 
 def test_the_theme_follows_the_system_and_the_button(opened):
-    ground = "getComputedStyle(document.body).backgroundColor"
-    dark, light = (opened(color_scheme=scheme) for scheme in ("dark", "light"))
-    assert dark.evaluate(ground) != light.evaluate(ground)
-    dark.click("#theme")
-    assert dark.evaluate(ground) == light.evaluate(ground)
-    dark.reload()
-    assert dark.evaluate(ground) == light.evaluate(ground)
+    page, ground = opened(color_scheme="dark"), "getComputedStyle(document.body).backgroundColor"
+    dark = page.evaluate(ground)
+    page.emulate_media(color_scheme="light")
+    light = page.evaluate(ground)
+    assert light != dark
+    page.emulate_media(color_scheme="dark")
+    assert page.evaluate(ground) == dark
+    page.click("#theme")
+    assert page.evaluate(ground) == light
+    page.reload()
+    assert page.evaluate(ground) == light
 
 
-def test_the_list_of_keys_opens_and_closes(opened):
-    page = opened()
+def test_the_list_of_keys_opens_and_closes(shown):
+    page = shown()
     page.keyboard.press("?")
     assert page.locator("#help").is_visible()
     assert page.locator("#shortcuts dt").count() > 10
@@ -292,8 +338,8 @@ def test_it_fits_a_phone(opened):
     assert page.locator("#pixels td").first.inner_text() != ""
 
 
-def test_everything_that_takes_the_focus_has_a_name(opened):
-    page = opened()
+def test_everything_that_takes_the_focus_has_a_name(shown):
+    page = shown()
     nameless = page.evaluate("""() => [...document.querySelectorAll(
         "button, select, input, a, canvas, [tabindex='0']")].filter((node) => !(
             node.getAttribute("aria-label") || node.getAttribute("aria-labelledby")
@@ -365,12 +411,15 @@ def test_frames_that_fly_by_are_not_loaded(browser, report):
 
 
 @pytest.mark.parametrize("workers", [True, False])
-def test_the_flip_map_is_that_of_the_library(browser, report, workers):
-    page = new_page(browser)
-    if not workers:
+def test_the_flip_map_is_that_of_the_library(browser, report, shown, workers):
+    address = "#frame=1&a=rough&b=fine&ca=flip&cb=flip&mode=side"
+    if workers:
+        page = shown(address)
+    else:
+        page = new_page(browser)
         page.add_init_script("delete window.Worker")
-    page.goto(report[2] + "#frame=1&a=rough&b=fine&ca=flip&cb=flip&mode=side")
-    page.wait_for_selector(READY)
+        page.goto(report[2] + address)
+        page.wait_for_selector(READY)
     stage = box_of(page, "#stage")
     zoom = min(stage["width"] / 2 / WIDTH, stage["height"] / HEIGHT)
     reference = report[0].read_reference(1).color
@@ -380,9 +429,10 @@ def test_the_flip_map_is_that_of_the_library(browser, report, workers):
                         stage["y"] + stage["height"] / 2 + zoom * (y + 0.5 - HEIGHT / 2))
         page.wait_for_function("at => document.getElementById('pixel').textContent.startsWith(at)",
                                arg=f"x {x}, y {y}")
-        shown = float(page.locator("#pixels tr:first-child td").first.inner_text())
-        assert shown == pytest.approx(wanted[y, x], abs=0.004)
-    page.close()
+        value = float(page.locator("#pixels tr:first-child td").first.inner_text())
+        assert value == pytest.approx(wanted[y, x], abs=0.004)
+    if not workers:
+        page.close()
 
 
 def test_hollow_points_are_of_times_not_measured_in_turns(browser, report, tmp_path):

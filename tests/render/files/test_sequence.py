@@ -304,6 +304,7 @@ def test_frames_and_a_reference_can_be_added_later(tmp_path):
     ({"spp": 2}, "another spp"),
     ({"direct": "resampled"}, "another direct (mis there, resampled here)"),
     ({"sampler": "zsobol"}, "another sampler (pcg there, zsobol here)"),
+    ({"tracing": 2}, "another kind of frames (another version of onespp made them"),
 ])
 def test_another_sequence_is_not_continued_and_the_difference_is_named(tmp_path, change, words):
     small_sequence(tmp_path / "s")

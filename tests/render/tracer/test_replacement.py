@@ -202,6 +202,23 @@ def test_frames_have_the_mean_of_the_reference(name):
     assert_same_mean(*a, *b)
 
 
+def test_half_open_masks_under_an_even_sky_are_as_bright_as_in_closed_form():
+    """1 - o of the sky, and o of what the surface leaves of it: diffuse ones have as much by light
+    sampling as by what directions run into, so both densities have to have the opacity in them."""
+    albedo, quarters = 0.9, [(o, is_mirror) for is_mirror in (False, True) for o in (0.3, 0.7)]
+    shapes = tuple(
+        Shape(f"veil {i}", Rectangle(), {"type": "mask", "opacity": o, "bsdf":
+              mirror((albedo,) * 3) if is_mirror else diffuse((albedo,) * 3)},
+              translate((2 * (i % 2) - 1, 1 - 2 * (i // 2), 0)))
+        for i, (o, is_mirror) in enumerate(quarters))
+    scene = Scene("sky", "for a test", shapes, Camera(look_at((0, 0, 4), (0, 0, 0)), fov=20), 1, 8,
+                  8, 3, environment=1.0)
+    renderer = Renderer(scene, 8, 8, direct="resampled")
+    ours = [renderer.frame(0, seed, ("color",))["color"][..., :1] for seed in range(64)]
+    expected = np.array([1 - o + o * albedo for o, _ in quarters]).reshape(2, 2, 1)
+    assert_same_mean(*mean_and_variance([blocks(image, 4) for image in ours]), expected)
+
+
 def test_what_glass_reflects_is_specular_light_of_its_own():
     frame, _ = seen(Shape("sheet", Rectangle(), pane(), translate((0, 1, 1.5)) @ rotate(X, -50)))
     both = (frame["roughness"] == 0) & (frame["id"] >= 0)
