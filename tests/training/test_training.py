@@ -13,7 +13,7 @@ import pytest
 
 import onespp
 from onespp.datasets.folder import DataSet
-from onespp.denoise.methods.recurrent.weights import read_network
+from onespp.denoise.methods.learned.weights import read_network
 from onespp.render.errors import InputError
 from onespp.training import train as training
 from onespp.training.batches import KEPT, Batches
@@ -54,7 +54,8 @@ def test_what_cannot_be_trained_on_is_refused(made, tmp_path, monkeypatch):
             (made.folder, 32, "sequences of 3 frames: use a data set of 7 or more")):
         with pytest.raises(InputError, match=words):
             Batches.of(folder, crop, 1, 0)
-    for options, words in (({"width": "wide"}, "--width is wide: use full"),
+    for options, words in (({"network": "gan"}, "there is no network 'gan': use rae, unet"),
+                           ({"width": "wide"}, "--width is wide: use full"),
                            ({"batch": 0}, "--batch is 0"), ({"seed": -1}, "--seed is -1")):
         with pytest.raises(InputError, match=words):
             training.Settings(**options)  # type: ignore[arg-type]
@@ -121,7 +122,7 @@ def test_a_loss_that_is_no_number_stops_a_training_before_its_checkpoint(data, t
     monkeypatch.setattr(training._Optimizer, "step", lambda *_: float("nan"))
     with pytest.raises(InputError, match="the loss of step 1 is nan: look for frames of"):
         training.train(data.folder, tmp_path / "x.npz", 3,
-                       training.Settings("sixteenth", batch=1, crop=32), every=1)
+                       training.Settings(width="sixteenth", batch=1, crop=32), every=1)
     assert not [*tmp_path.iterdir()]
 
 
