@@ -55,7 +55,8 @@ class Checkpoint:
                 arrays = {name[6:]: file[name] for name in file.files if name.startswith("array/")}
                 # (before there were other networks, none was named)
                 found = Checkpoint({"network": "rae", **about["settings"]}, arrays,
-                                   file["losses"].tolist(), {int(k): v for k, v in about["validation"].items()},
+                                   file["losses"].tolist(),
+                                   {int(k): v for k, v in about["validation"].items()},
                                    about["seconds"])
         except (ValueError, KeyError, TypeError, AttributeError, EOFError,
                 zipfile.BadZipFile) as error:

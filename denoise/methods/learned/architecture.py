@@ -60,8 +60,9 @@ class Architecture:
     """A kind of network.
 
     Attributes:
-        name, about: of the kind, in a few words. levels: how often sides are halved. slope: of the rectifier, below 0.
-        last: the layer that has none. width: of `WIDTHS`, that which comes along.
+        name, about: of the kind, the second in a few words. levels: how often sides are halved.
+        slope: of the rectifier, below 0. last: the layer that has none. width: of `WIDTHS`, that
+            which is trained unless another is asked for, and which comes along.
         layers: width -> name -> layer, in the order in which they are run.
         run: a frame's planes and the memory of the frame before -> the three planes of the result,
             and the memory for the next frame.

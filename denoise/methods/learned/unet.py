@@ -10,8 +10,9 @@ Source: Open Image Denoise (see `unet_plan.py`). Code and weights are ours: half
 trained by `onespp train unet`.
 
 Departures:
-- The input is that of `rae-quarter`: light over albedo, compressed by g, two components of the normal,
-  depth and roughness. Open Image Denoise has colour, with another curve, albedo and the normal.
+- The input is that of `rae-quarter`: light over albedo, compressed by g, two components of the
+  normal, depth and roughness. Open Image Denoise has colour, compressed by another curve, albedo
+  and the normal.
 - Steps, loss and rate are those of `rae-quarter`, with a temporal term and frame weights.
 - The result is held by the pixels around.
 """
