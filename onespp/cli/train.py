@@ -9,6 +9,7 @@ import click
 
 from onespp.denoise.methods.learned.architecture import WIDTHS, Architecture
 from onespp.denoise.methods.learned.networks import NETWORKS
+from onespp.denoise.methods.learned.weights import shipped
 
 
 @click.group()
@@ -17,11 +18,14 @@ def train() -> None:
 
 
 def _command(kind: Architecture) -> click.Command:
+    method = f"{kind.name}-{kind.width}"
+    use = (f" Use the result by `onespp denoise --method {method} --set weights=FILE`."
+           if shipped(kind.name).exists() else "")  # without weights there is no such method
+
     @click.command(kind.name, help=f"""Train {kind.about} on the data set in DIR.
 
     Without DIR one is drawn beside FILE first, by the plan `rooms`. The same command goes on where
-    it was stopped, to the same weights, and with more --steps further. Use the result by `onespp
-    denoise --method {kind.name}-{kind.width} --set weights=FILE`.
+    it was stopped, to the same weights, and with more --steps further.{use}
     """)
     @click.argument("folder", required=False, type=click.Path(path_type=Path), metavar="[DIR]")
     @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="FILE",

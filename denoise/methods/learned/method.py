@@ -5,6 +5,7 @@ frame's surfaces; input and result are planes of
 
     g(L) = log(1 + 16 L) / log 17  (three),  n_x,  n_y,  z / (z + m)  (1: no surface),  r
 
+Form:
 - Depth is a share, so that the unit of length does not matter; m is of each frame.
 - The result is held between the least and greatest L of the 15x15 pixels around: a network may
   answer anything where frames are unlike those it has seen, and a constant is not kept by itself.
