@@ -29,9 +29,9 @@ from onespp.denoise.methods.asvgf import Asvgf
 from onespp.denoise.methods.atrous import Atrous
 from onespp.denoise.methods.bilateral import Bilateral
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
+from onespp.denoise.methods.learned.rae import Rae
 from onespp.denoise.methods.outliers import RemoveOutliers, WithoutOutliers
 from onespp.denoise.methods.parameters import renamed_parameters, with_present_names
-from onespp.denoise.methods.recurrent.rae import Rae
 from onespp.denoise.methods.regression.bmfr import Bmfr
 from onespp.denoise.methods.reliable_motion.trmv import Trmv
 from onespp.denoise.methods.separable import BilateralSeparable

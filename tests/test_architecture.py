@@ -30,7 +30,7 @@ ROOMS = (
     "onespp.denoise.run", "onespp.denoise.score",
     "onespp.denoise.catalog", "onespp.denoise.peers",
     "onespp.denoise.methods.antialiasing", "onespp.denoise.methods.filtered_innovation",
-    "onespp.denoise.methods.recurrent", "onespp.denoise.methods.regression",
+    "onespp.denoise.methods.learned", "onespp.denoise.methods.regression",
     "onespp.denoise.methods.reliable_motion",
     "onespp.denoise.methods.unguided",
     "onespp.denoise.methods",

@@ -13,12 +13,13 @@ import numpy as np
 
 from onespp.clips.clips import Clips
 from onespp.datasets.folder import DataSet
-from onespp.denoise.methods.recurrent.architecture import ALIGNMENT
-from onespp.denoise.oracles.rae import compressed, planes_of, texture_of
+from onespp.denoise.methods.learned.networks import NETWORKS
+from onespp.denoise.oracles.learned import compressed, planes_of, texture_of
 from onespp.render.errors import InputError
 from onespp.scenes.catalog import GENERATED, HARD_NAMES, SCENES
 
 FRAMES = 7  # of a clip
+ALIGNMENT = max(kind.alignment for kind in NETWORKS.values())  # of its sides, for any network
 KEPT = frozenset({*SCENES, *HARD_NAMES, *GENERATED[12:], "slow_box", "swinging_lamp", "docs"})
 """Scenes that results are measured on, which nothing may be trained on."""
 _CHANNELS = ("color", "albedo", "emission", "normal", "depth", "id")

@@ -1,7 +1,7 @@
-"""What the recurrent autoencoder is trained to.
+"""What networks are trained to.
 
-Symbols: P result, T truth, both compressed light (g of denoise/methods/recurrent/rae.py), t a frame
-of the clip. Mean over pixels and components of
+Symbols: P result, T truth, both compressed light (g of denoise/methods/learned/method.py), t a
+frame of the clip. Mean over pixels and components of
 
     0.8 |P - T| + 0.1 |LoG P - LoG T| + 0.1 |(P_t - P_t-1) - (T_t - T_t-1)|
 

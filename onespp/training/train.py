@@ -19,7 +19,6 @@ scaled to it, or else one clip with a firefly would shorten the next hundred ste
 # pyright: standard, reportMissingImports=false
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -31,18 +30,22 @@ from typing import Any
 
 import numpy as np
 
-from onespp.denoise.methods.recurrent.architecture import WIDTHS, Weights, begun
-from onespp.denoise.methods.recurrent.weights import Network, write_network
+from onespp.denoise.methods.learned.architecture import WIDTHS, Architecture, Weights
+from onespp.denoise.methods.learned.networks import architecture_of
+from onespp.denoise.methods.learned.weights import Network, write_network
 from onespp.render.errors import InputError
 from onespp.render.files.atomic import write_text
+from onespp.render.files.json_file import format_json
 from onespp.render.host.versions import versions
 from onespp.render.progress import Progress, silent
 
 from .batches import Batches
 from .checkpoint import Checkpoint
+from .log import Data, Log
 
 RATE, RAMP, LONGEST = 1e-3, 50, 1.0
 RULES = 2  # by which steps are made: changes with whatever changes the weights of a seed
+VALIDATION_SEED = 1  # whatever the training's: losses of several are of the same clips
 _SHOWN = 50  # steps whose mean loss is shown
 
 
@@ -51,22 +54,28 @@ class Settings:
     """What the weights after a step depend on, beside the data.
 
     Attributes:
-        width: of `WIDTHS`. seed: of the first weights and all batches. batch: clips a step.
-        crop: side of a clip, pixels.
+        network: of `NETWORKS`. width: of `WIDTHS`. seed: of the first weights and all batches.
+        batch: clips a step. crop: side of a clip, pixels.
     """
 
+    network: str = "rae"
     width: str = "quarter"
     seed: int = 0
     batch: int = 4
     crop: int = 128
 
     def __post_init__(self) -> None:
+        architecture_of(self.network)
         if self.width not in WIDTHS:
             raise InputError(f"--width is {self.width}: use {', '.join(WIDTHS)}")
         if self.batch < 1:
             raise InputError(f"--batch is {self.batch}: use 1 or more")
         if self.seed < 0:
             raise InputError(f"--seed is {self.seed}: use 0 or more")
+
+    @property
+    def architecture(self) -> Architecture:
+        return architecture_of(self.network)
 
 
 def require_jax() -> None:
@@ -117,7 +126,7 @@ def train(folder: Path, out: Path, steps: int, settings: Settings, every: int = 
         raise InputError(f"{path} has {done} steps already: use --steps {done} or more, or another "
                          "--out")
     optimizer.load(stand.arrays)
-    name = f"train rae-{settings.width}"
+    name = f"train {settings.network}-{settings.width}"
 
     def save() -> None:
         stand.arrays = optimizer.arrays()
@@ -159,24 +168,24 @@ def log_of(out: Path) -> Path:
 
 def _write(out: Path, stand: Checkpoint, weights: Weights, settings: Settings,
            batches: Batches) -> None:
-    plan = batches.clips.plan
-    about = {**asdict(settings), "steps": len(stand.losses),
-             "data": {"name": plan.name, "seed": plan.seed, "digest": batches.digest,
-                      "sequences": len(batches.clips.numbers)},
-             "versions": versions("jax", "optax", "numpy")}
-    del about["width"]
-    write_network(out, Network(settings.width, weights, about))
-    log = {**about, "width": settings.width, "seconds": round(stand.seconds, 1),
-           "loss": [round(x, 6) for x in stand.losses],
-           "validation": {str(k): round(v, 6) for k, v in stand.validation.items()}}
-    write_text(log_of(out), json.dumps(log, indent=1) + "\n")
+    plan, digits = batches.clips.plan, 6
+    log = Log(
+        **asdict(settings), steps=len(stand.losses),
+        data=Data(name=plan.name, seed=plan.seed, digest=batches.digest,
+                  sequences=len(batches.clips.numbers)),
+        versions=versions("jax", "optax", "numpy"), seconds=round(stand.seconds, 1),
+        loss=[round(x, digits) for x in stand.losses],
+        validation={str(k): round(v, digits) for k, v in stand.validation.items()})
+    about = log.model_dump(exclude={"network", "width", "seconds", "loss", "validation"})
+    write_network(out, Network(settings.network, settings.width, weights, about))
+    write_text(log_of(out), format_json(log))
 
 
 def _validation(folder: Path, settings: Settings,
                 cache: Path | None) -> tuple[np.ndarray, np.ndarray] | None:
     """A batch of scenes that are not trained on; None where the data set has none."""
     try:
-        batches = Batches.of(folder, settings.crop, settings.batch, settings.seed, cache,
+        batches = Batches.of(folder, settings.crop, settings.batch, VALIDATION_SEED, cache,
                              "validation", augment=False)
     except InputError:
         return None
@@ -206,11 +215,11 @@ class _Optimizer:
         import jax
         import optax
 
+        from .forward import forward
         from .loss import loss
-        from .network import forward
 
         def of(weights: Any, planes: Any, truth: Any) -> Any:
-            return loss(forward(weights, planes), truth)
+            return loss(forward(settings.architecture, weights, planes), truth)
 
         def update(weights: Any, mean: Any, moments: Any, rate: Any, share: Any, planes: Any,
                    truth: Any) -> tuple:
@@ -223,7 +232,8 @@ class _Optimizer:
         adam = optax.chain(optax.clip_by_global_norm(LONGEST),
                            optax.scale_by_adam(b1=0.9, b2=0.99))
         self._jax, self._update, self._loss = jax, jax.jit(update), jax.jit(of)
-        self._weights: Any = begun(settings.width, settings.seed)
+        self._weights: Any = settings.architecture.begun(settings.width,
+                                                                   settings.seed)
         self._mean: Any = self._weights
         self._moments: Any = adam.init(self._weights)
 

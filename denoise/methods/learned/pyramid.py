@@ -1,4 +1,4 @@
-"""The recurrent autoencoder on a grid: its layers in the order of `architecture.py`."""
+"""A network on grids of Dr.Jit lanes: recorded layers, and what leads from level to level."""
 
 from __future__ import annotations
 
@@ -14,17 +14,14 @@ from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.step import Step
 from onespp.render.host.aligned import aligned
 
-from .architecture import ALIGNMENT, LEVELS
+from .architecture import Architecture, Memory
 from .layers import Convolution, pool, upsample
 from .weights import Network
 
-Memory = list[list[Float]]
-"""The output of each block in the frame before."""
-
 
 @dataclass(frozen=True)
-class Autoencoder:
-    """The recorded layers for frames of one size, which are padded (`architecture.ALIGNMENT`).
+class Pyramid:
+    """The `Operations` of a network for frames of one size, which are padded.
 
     Attributes:
         grids: of level 0, which is padded, to the coarsest.
@@ -32,6 +29,7 @@ class Autoencoder:
             each lane of the frame that of level 0.
     """
 
+    architecture: Architecture
     grids: list[Stencil]
     layers: dict[str, Convolution] = field(repr=False)
     pools: list[Step[..., list[Float]]]
@@ -42,28 +40,19 @@ class Autoencoder:
     crop: Step[..., list[Float]]
 
     @staticmethod
-    def make(stencil: Stencil, network: Network) -> Autoencoder:
+    def make(stencil: Stencil, network: Network) -> Pyramid:
         """For frames on a stencil."""
-        height, width = (-(-n // ALIGNMENT) * ALIGNMENT for n in (stencil.height, stencil.width))
+        kind, weights = network.architecture, network.weights
+        height, width = (-(-n // kind.alignment) * kind.alignment
+                         for n in (stencil.height, stencil.width))
         grids = [Stencil(height >> i, width >> i, 1, layout=stencil.layout)
-                 for i in range(LEVELS + 1)]
-
-        def layer(name: str, level: int, is_linear: bool = False) -> None:
-            weights = network.weights
-            layers[name] = Convolution.make(grids[level], weights[name], weights[f"{name}.bias"],
-                                            is_linear)
-
-        layers: dict[str, Convolution] = {}
-        for i in range(LEVELS):
-            layer(f"down{i}", i)
-            for part in ("input", "mix", "output"):
-                layer(f"block{i}.{part}", i + 1)
-        for i in reversed(range(LEVELS)):
-            layer(f"up{i}.join", i)
-            layer(f"up{i}.out", i, is_linear=i == 0)
+                 for i in range(kind.levels + 1)]
+        layers = {name: Convolution.make(grids[layer.level], weights[name], weights[f"{name}.bias"],
+                                         kind.slope_of(name))
+                  for name, layer in kind.layers(network.width).items()}
         pairs = [*pairwise(grids)]
-        return Autoencoder(
-            grids, layers, [Step(partial(pool, a, b)) for a, b in pairs],
+        return Pyramid(
+            kind, grids, layers, [Step(partial(pool, a, b)) for a, b in pairs],
             [Step(partial(upsample, b, a)) for a, b in pairs],
             aligned(stencil.UInt, _mirrored(stencil, grids[0]).astype(np.uint32)),
             aligned(stencil.UInt, _lanes(grids[0], stencil).astype(np.uint32)),
@@ -75,19 +64,20 @@ class Autoencoder:
         Args:
             planes: evaluated input on the frame's lanes. memory: empty before the first frame.
         """
-        x, outputs, layers = self.pad(self.inside, planes), [], self.layers
-        skipped = [x]
-        for i in range(LEVELS):
-            x = self.pools[i](layers[f"down{i}"](x))
-            x = layers[f"block{i}.input"](x)
-            before = memory[i] if memory else [self.grids[i + 1].constant(0) for _ in x]
-            x = layers[f"block{i}.output"](layers[f"block{i}.mix"](x, before))
-            outputs.append(x)
-            skipped.append(x)
-        for i in reversed(range(LEVELS)):
-            x = layers[f"up{i}.join"](self.upsamples[i](x), skipped[i])
-            x = layers[f"up{i}.out"](x)
-        return self.crop(self.outside, x), outputs
+        found, memory = self.architecture.run(self, self.pad(self.inside, planes), memory)
+        return self.crop(self.outside, found), memory
+
+    def layer(self, name: str, *features: list[Float]) -> list[Float]:
+        return self.layers[name](*features)
+
+    def pooled(self, level: int, features: list[Float]) -> list[Float]:
+        return self.pools[level](features)
+
+    def upsampled(self, level: int, features: list[Float]) -> list[Float]:
+        return self.upsamples[level](features)
+
+    def nothing(self, level: int, features: list[Float]) -> list[Float]:
+        return [self.grids[level].constant(0) for _ in features]
 
 
 def _mirrored(stencil: Stencil, padded: Stencil) -> np.ndarray:

@@ -22,8 +22,6 @@ from onespp.denoise.jit.grid import Planes, Stencil
 from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.taps import Taps
 
-from .architecture import SLOPE
-
 _TAPS = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
 
 
@@ -39,14 +37,14 @@ class Convolution:
 
     @staticmethod
     def make(stencil: Stencil, weights: np.ndarray, bias: np.ndarray,
-             is_linear: bool) -> Convolution:
-        """Of weights (3, 3, inputs, outputs)."""
+             slope: float) -> Convolution:
+        """Of weights (3, 3, inputs, outputs), and the slope below 0; 1: no rectifier."""
         inputs, outputs = weights.shape[2:]
         planes = stencil.planes([0.0] * inputs)
         matrix = np.ascontiguousarray(weights.reshape(-1, outputs).T, np.float32)
         return Convolution(
             planes, planes.taps(_TAPS), stencil.table(matrix.reshape(-1)), stencil.table(bias),
-            Step(partial(convolve, shape=(outputs, 9 * inputs), is_linear=is_linear)))
+            Step(partial(convolve, shape=(outputs, 9 * inputs), slope=slope)))
 
     def __call__(self, *features: list[Float]) -> list[Float]:
         """Of evaluated features, which are put beside each other."""
@@ -58,14 +56,14 @@ class Convolution:
 
 
 def convolve(taps: Taps[list[Float]], matrix: Float, bias: Float, shape: tuple[int, int],
-             is_linear: bool) -> list[Float]:
+             slope: float) -> list[Float]:
     """One output a row of the matrix."""
     around = [x for t in range(len(taps)) for x in taps.at(t)]
     tensor: Any = dr.tensor_t(type(matrix))
     rows = nn.view(tensor(matrix, shape))
     found = [*nn.matvec(rows, nn.CoopVec(*around), nn.view(bias))]
-    if not is_linear:
-        found = [dr.maximum(x, SLOPE * x) for x in found]
+    if slope != 1:
+        found = [dr.maximum(x, slope * x) for x in found]
     dr.eval(found)
     return found
 

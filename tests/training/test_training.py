@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import statistics
 import subprocess
 import sys
 import time
@@ -13,11 +14,12 @@ import pytest
 
 import onespp
 from onespp.datasets.folder import DataSet
-from onespp.denoise.methods.recurrent.weights import read_network
+from onespp.denoise.methods.learned.weights import read_network
 from onespp.render.errors import InputError
 from onespp.training import train as training
 from onespp.training.batches import KEPT, Batches
 from onespp.training.checkpoint import Checkpoint
+from onespp.training.log import Spread, read_logs, spreads, table
 
 needs_jax = pytest.mark.skipif(
     find_spec("jax") is None or find_spec("optax") is None,
@@ -54,7 +56,8 @@ def test_what_cannot_be_trained_on_is_refused(made, tmp_path, monkeypatch):
             (made.folder, 32, "sequences of 3 frames: use a data set of 7 or more")):
         with pytest.raises(InputError, match=words):
             Batches.of(folder, crop, 1, 0)
-    for options, words in (({"width": "wide"}, "--width is wide: use full"),
+    for options, words in (({"network": "gan"}, "there is no network 'gan': use rae, unet"),
+                           ({"width": "wide"}, "--width is wide: use full"),
                            ({"batch": 0}, "--batch is 0"), ({"seed": -1}, "--seed is -1")):
         with pytest.raises(InputError, match=words):
             training.Settings(**options)  # type: ignore[arg-type]
@@ -66,13 +69,36 @@ def test_what_cannot_be_trained_on_is_refused(made, tmp_path, monkeypatch):
 def test_a_checkpoint_of_another_training_or_a_damaged_one_is_refused(tmp_path):
     path = tmp_path / "x.checkpoint.npz"
     Checkpoint({"seed": 1}, {"a": np.ones(3)}, [0.5, 0.25], {2: 0.3}, 9.0).write(path)
-    again = Checkpoint.read(path, {"seed": 1})
+    again = Checkpoint.read(path, {"network": "rae", "seed": 1})  # those of before name none
     assert (again.losses, again.validation, again.seconds) == ([0.5, 0.25], {2: 0.3}, 9.0)
     with pytest.raises(InputError, match=r"seed is 1 there, 2 here\): use another --out"):
         Checkpoint.read(path, {"seed": 2})
     path.write_bytes(path.read_bytes()[:-99])
     with pytest.raises(InputError, match=r"is damaged.*: remove it"):
         Checkpoint.read(path, {"seed": 1})
+
+
+def test_losses_of_seeds_are_told_with_their_spread(tmp_path):
+    def log(name, seed, validation, network="unet", digest="a"):
+        path = tmp_path / name
+        path.write_text(json.dumps({
+            "network": network, "width": "half", "seed": seed, "batch": 4, "crop": 128, "steps": 3,
+            "data": {"name": "rooms", "seed": 1, "digest": digest, "sequences": 9},
+            "versions": {}, "seconds": 1.0, "loss": [0.5, 0.3, 0.1], "validation": validation}))
+        return path
+
+    paths = [log("0", 0, {"2": 0.2, "3": 0.1}), log("1", 1, {"2": 0.4}), log("2", 2, {"2": 0.6}),
+             log("other", 0, {"2": 0.7}, network="rae")]
+    logs = read_logs(paths)
+    assert spreads(logs) == {"unet-half": Spread(3, 2, statistics.mean((0.2, 0.4, 0.6)),
+                                                 statistics.stdev((0.2, 0.4, 0.6)))}
+    lines = table(logs).splitlines()
+    assert lines[1].split() == ["unet-half", "0", "3", "0.3000", "0.1000", "3"]
+    assert lines[-1] == "unet-half: 0.4000 +- 0.2000 on others at step 2, 3 seeds"
+    for path, words in ((log("else", 0, {"2": 0.1}, digest="b"), "of trainings with another data"),
+                        (log("none", 0, {}), "none has no losses on other scenes")):
+        with pytest.raises(InputError, match=words):
+            read_logs([paths[0], path])
 
 
 def test_the_rate_grows_tenfold_and_falls_as_the_root():
@@ -114,6 +140,16 @@ def test_a_batch_follows_from_seed_and_step(data):
     assert not np.array_equal(planes, Batches.of(data.folder, 32, 2, 6).read(3)[0])
 
 
+@pytest.mark.slow
+def test_the_clips_that_validate_are_the_same_whatever_the_seed(data):
+    """Else the spread of losses over seeds would be that of the clips."""
+    first, again = (training._validation(data.folder, training.Settings(seed=seed, crop=32), None)
+                    for seed in (0, 7))
+    assert first is not None
+    assert again is not None
+    np.testing.assert_array_equal(first[0], again[0])
+
+
 @needs_jax
 @pytest.mark.slow
 def test_a_loss_that_is_no_number_stops_a_training_before_its_checkpoint(data, tmp_path,
@@ -121,7 +157,7 @@ def test_a_loss_that_is_no_number_stops_a_training_before_its_checkpoint(data, t
     monkeypatch.setattr(training._Optimizer, "step", lambda *_: float("nan"))
     with pytest.raises(InputError, match="the loss of step 1 is nan: look for frames of"):
         training.train(data.folder, tmp_path / "x.npz", 3,
-                       training.Settings("sixteenth", batch=1, crop=32), every=1)
+                       training.Settings(width="sixteenth", batch=1, crop=32), every=1)
     assert not [*tmp_path.iterdir()]
 
 

@@ -1,1 +1,0 @@
-"""Networks that remember: their plan and weights, in NumPy, and their layers in Dr.Jit."""
