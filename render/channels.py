@@ -85,6 +85,7 @@ def _rgb(layer: str) -> tuple[str, ...]:
 
 
 MOST_GROUPS = 4  # of lights, each with a visibility of its own
+SUN = -2  # `light_id` of the environment's brightest spot, where it is a light of its own
 
 _ROWS = (
     Channel("color", Group.RADIANCE, ("R", "G", "B"), FLOAT, Display.LIGHT, 0.0,
@@ -118,7 +119,7 @@ _ROWS = (
             "from the first hit to the point of a light that its shadow ray asked for, world axes, "
             "scene units; 0: no ray (likewise)"),
     Channel("light_id", Group.SHADOW, ("light.ID",), OBJECT_ID, Display.OBJECT, -1.0,
-            "object ID of that light; -1: none, or the environment (likewise)"),
+            "object ID of that light; -1: none, or the environment, -2: its sun (likewise)"),
     Channel("blocker_distance", Group.SHADOW, ("blocker.Z",), FLOAT, Display.RANGE, 0.0,
             "from the first hit to what stopped that ray, scene units; 0: nothing did (likewise)"),
     Channel("blocker_id", Group.SHADOW, ("blocker.ID",), OBJECT_ID, Display.OBJECT, -1.0,
