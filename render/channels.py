@@ -85,13 +85,15 @@ def _rgb(layer: str) -> tuple[str, ...]:
 
 
 MOST_GROUPS = 4  # of lights, each with a visibility of its own
+SUN = -2  # `light_id` of the environment's brightest spot, where it is a light of its own
 TRACING = 2
 """Counts the changes of what frames hold. Raise it whenever the same scene, frame and seed give
 other values than rounding explains in any channel, of frames or references: sequences and data sets
 begun before are then not continued. One number serves both, since what changes the mean of light
 changes both, and more than one would let a folder hold frames that its references do not fit.
 
-2: the first surface behind mirrors, clear glass and masks is the pixel's (`tracer/replacement.py`).
+2: the first surface behind mirrors, clear glass and masks is the pixel's (`tracer/replacement.py`);
+under half-open masks mirrors and glass show lamps; the sun of a sky is a light (`lights/sun.py`).
 """
 
 _ROWS = (
@@ -126,7 +128,7 @@ _ROWS = (
             "from the first hit to the point of a light that its shadow ray asked for, world axes, "
             "scene units; 0: no ray (likewise)"),
     Channel("light_id", Group.SHADOW, ("light.ID",), OBJECT_ID, Display.OBJECT, -1.0,
-            "object ID of that light; -1: none, or the environment (likewise)"),
+            "object ID of that light; -1: none, or the environment, -2: its sun (likewise)"),
     Channel("blocker_distance", Group.SHADOW, ("blocker.Z",), FLOAT, Display.RANGE, 0.0,
             "from the first hit to what stopped that ray, scene units; 0: nothing did (likewise)"),
     Channel("blocker_id", Group.SHADOW, ("blocker.ID",), OBJECT_ID, Display.OBJECT, -1.0,

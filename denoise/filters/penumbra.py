@@ -43,9 +43,9 @@ def penumbra_samples(stencil: Stencil, blocked: Bool, share: Float, cosine: Floa
         blocked: of `shadow_motion.stopped`. share: d / D. cosine: between the ray and the normal.
         light_id: what the ray was sent to. focal: f. sizes: of `light_sizes`.
     """
-    environment = float(dr.width(sizes) - 1)
+    from_end = dr.maximum(light_id, -2) + float(dr.width(sizes))
     size = dr.gather(stencil.Float, sizes, stencil.UInt(
-        dr.select(blocked, dr.select(light_id >= 0, light_id, environment), 0)))
+        dr.select(blocked, dr.select(light_id >= 0, light_id, from_end), 0)))
     left = dr.square((1 - share) * cosine)
     q = left / dr.maximum(dr.square(size * share * focal / depth) + left, 1e-20)
     return PenumbraSample(dr.select(blocked, stencil.Float(1), 0),

@@ -33,7 +33,8 @@ class ShadowRay(NamedTuple):
     """One ray a pixel, traced and not yet evaluated.
 
     Attributes:
-        light: from the surface to the point of the light, world axes. light_id: its object ID.
+        light: from the surface to the point of the light, world axes. light_id: its object ID, or
+            less than 0.
         blocker_distance, blocker_id: of what stopped the ray.
     """
 
@@ -86,9 +87,10 @@ _FARTHEST = 1e15  # of a point of a light that counts
 
 
 def light_sizes(frame: Frame) -> np.ndarray:
-    """(objects + 1,) float32: twice the standard deviation of the points of each object that shadow
-    rays asked for and, last, of the environment's. Infinite for less than `_FEWEST_POINTS`."""
-    count = len(frame.world_from_object) + 1
+    """(objects + 2,) float32: twice the standard deviation of the points of each object that shadow
+    rays asked for and, at -2 and -1, of the environment's sun and of the rest of it. Infinite for
+    less than `_FEWEST_POINTS`."""
+    count = len(frame.world_from_object) + 2
     step = max(1, round((frame.height * frame.width / _LIGHT_SAMPLES) ** 0.5))
     some = slice(step // 2, None, step)
     depth, light, id_ = (frame[name][some, some] for name in ("depth", "light", "light_id"))
@@ -98,8 +100,8 @@ def light_sizes(frame: Frame) -> np.ndarray:
     with np.errstate(invalid="ignore", over="ignore"):
         point = depth[..., None] * ray + light @ frame.camera_from_world[:3, :3].T
         good = ((frame["id"][some, some] >= 0) & (np.abs(light).sum(-1) > 0)
-                & (np.abs(point) < _FARTHEST).all(-1) & (id_ < count - 1))
-    of, point = np.where(id_ < 0, count - 1, id_)[good].astype(int), point[good]
+                & (np.abs(point) < _FARTHEST).all(-1) & (id_ >= -2) & (id_ < count - 2))
+    of, point = np.where(id_ < 0, count + id_, id_)[good].astype(int), point[good]
     number = np.bincount(of, minlength=count)
 
     def mean(values: np.ndarray) -> np.ndarray:

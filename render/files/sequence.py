@@ -30,7 +30,7 @@ from pathlib import Path
 
 import numpy as np
 
-from onespp.render.channels import CHANNELS, MOST_GROUPS, REFERENCE
+from onespp.render.channels import CHANNELS, MOST_GROUPS, REFERENCE, SUN
 from onespp.render.derived import available, sources, with_derived
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
@@ -402,11 +402,13 @@ def _differences(parts: np.ndarray) -> dict[str, np.ndarray]:
 def object_ids(path: Path, name: str, image: np.ndarray, count: int) -> np.ndarray:
     """The image `name` of a file, of object IDs, as int32.
 
-    Kernels index with it unchecked, so all but the whole numbers -1 to count - 1 are refused here.
+    Kernels index with it unchecked, so all but the whole numbers -1 to count - 1 are refused here,
+    and `SUN` where it may be.
     """
-    if not ((image >= -1) & (image < count) & (image == np.floor(image))).all():
-        raise InputError(f"{path} has object IDs other than the whole numbers -1 to {count - 1} in "
-                         f"'{name}': make it again")
+    least = SUN if name == "light_id" else -1
+    if not ((image >= least) & (image < count) & (image == np.floor(image))).all():
+        raise InputError(f"{path} has object IDs other than the whole numbers {least} to "
+                         f"{count - 1} in '{name}': make it again")
     return image.astype(np.int32)
 
 

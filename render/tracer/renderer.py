@@ -17,6 +17,7 @@ from onespp.render.channels import (
     REPLAY,
     SHADOW,
     SPLIT,
+    SUN,
     UNSHADOWED,
 )
 from onespp.render.errors import InputError
@@ -133,7 +134,9 @@ class Renderer(View):
                     light = radiance.shadow_ray.light
                     planes |= {
                         "light": (behind.unfolded(light) if behind else light) * unit,
-                        "light_id": self.stage.image_id(radiance.shadow_ray.light_shape, 0, row),
+                        "light_id": dr.select(
+                            radiance.shadow_ray.to_sun, SUN,
+                            self.stage.image_id(radiance.shadow_ray.light_shape, 0, row)),
                         "blocker_distance": radiance.shadow_ray.blocker_distance * unit,
                         "blocker_id": self.stage.image_id(radiance.shadow_ray.blocker_shape,
                                                           radiance.shadow_ray.blocker_face, row),

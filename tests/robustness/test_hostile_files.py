@@ -17,6 +17,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from onespp.render.channels import SUN
 from onespp.render.errors import InputError
 from onespp.render.files import atomic
 from onespp.render.files.exr import read_exr, write_exr
@@ -343,11 +344,13 @@ def test_ids_that_point_at_no_object_are_not_read(tmp_path):
     sequence = small_sequence(tmp_path)
     path = tmp_path / "frames/0000.exr"
     good, _ = read_exr(path)
-    for plane, value in product(("ID", "light.ID"), (3, -2, 0.5, np.nan, 1e30)):
+    for (plane, least), value in product({"ID": -1, "light.ID": SUN}.items(),
+                                         (3, -3, 0.5, np.nan, 1e30)):
         planes = {name: np.array(image) for name, image in good.items()}
         planes[plane][4, 4] = value
         write_exr(path, planes)
-        assert "object IDs other than the whole numbers -1 to 2" in sentence(sequence.read_frame, 0)
+        assert (f"object IDs other than the whole numbers {least} to 2"
+                in sentence(sequence.read_frame, 0))
 
 
 def test_a_reference_that_does_not_say_its_samples_is_refused(tmp_path):

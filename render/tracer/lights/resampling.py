@@ -45,6 +45,7 @@ from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.sampler import Sampler
 
 from .reservoir import offered
+from .sun import SUN_BIT, Sun
 
 DELTA = 0.1
 _DIMMEST = 1e-6  # share of l(U): a group that gives less has no visibility
@@ -52,15 +53,16 @@ _DIMMEST = 1e-6  # share of l(U): a group that gives less has no visibility
 
 @dataclass
 class Lights:
-    """All strata of a scene's lights, in the order of `scene.emitters()`.
+    """All strata of a scene's lights, in the order of `scene.emitters()`, the sun's last.
 
-    stratum: which part of which emitter it is (`stratum_word`). group: that it is in. sizes: strata
-    in each group, none where all lights are one.
+    stratum: which part of which light it is (`stratum_word`). group: that it is in. sizes: strata
+    in each group, none where all lights are one. sun: None where there is none.
     """
 
     stratum: mi.UInt32
     group: mi.UInt32
     sizes: tuple[int, ...]
+    sun: Sun | None = None
 
 
 @dataclass
@@ -84,8 +86,8 @@ class DirectLight:
 
     light: from the surface to the light's point, 0 where no ray was sent. blocker_distance: from
     the surface to what stopped the ray, 0 if nothing did. light_shape, blocker_shape: index in the
-    JIT registry, 0 for none; blocker_face: which of its faces. groups: None where all lights are
-    one.
+    JIT registry, 0 for none; blocker_face: which of its faces. to_sun: the ray went to the sun.
+    groups: None where all lights are one.
     """
 
     direct: mi.Color3f
@@ -95,6 +97,7 @@ class DirectLight:
     blocker_distance: mi.Float
     blocker_shape: mi.UInt32
     blocker_face: mi.UInt32
+    to_sun: mi.Bool
     groups: GroupSample | None = None
 
     def through(self, throughput: mi.Color3f) -> DirectLight:
@@ -124,7 +127,7 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     k = mi.UInt32(0)
     while dr.hint(k < strata, max_iterations=strata, label="lights"):
         stratum = dr.gather(mi.UInt32, lights.stratum, k, active)
-        c, light = contribution(scene, si, stratum, mi.Point2f(0.5), active)
+        c, light = contribution(scene, si, stratum, mi.Point2f(0.5), active, lights.sun)
         unshadowed += c
         if dr.hint(len(lights.sizes) > 0, mode="scalar"):
             c = weight(si, light, emitters, active) * c
@@ -142,20 +145,23 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     anywhere = dr.select(dark, choice, left / DELTA)
     picked = dr.select(uniform, dr.minimum(mi.UInt32(anywhere * strata), strata - 1), picked)
     stratum = dr.gather(mi.UInt32, lights.stratum, picked, active)
-    middle, light = contribution(scene, si, stratum, mi.Point2f(0.5), active & uniform)
+    middle, light = contribution(scene, si, stratum, mi.Point2f(0.5), active & uniform,
+                                 lights.sun)
     if dr.hint(len(lights.sizes) > 0, mode="scalar"):
         middle = weight(si, light, emitters, active & uniform) * middle
     picked_luminance = dr.select(uniform, mi.luminance(middle), picked_luminance)
     p = dr.select(dark, 1, (1 - DELTA) * strata * picked_luminance / total + DELTA) / strata
 
-    c, light = contribution(scene, si, stratum, jitter, active)
+    c, light = contribution(scene, si, stratum, jitter, active, lights.sun)
     lit = active & (dr.max(c) > 0)
     toward = si.spawn_ray_to(light.p)
     blocker = scene.ray_intersect_preliminary(toward, coherent=False, active=lit)
     shadowed = blocker.is_valid()
     w = weight(si, light, emitters, lit)
     direct = dr.select(lit & ~shadowed, w * c / p, 0)
-    sample = None
+    sample, to_sun = None, mi.Bool(False)
+    if dr.hint(lights.sun is not None, mode="scalar"):
+        to_sun = lit & ((stratum & SUN_BIT) != 0)
     if dr.hint(len(lights.sizes) > 0, mode="scalar"):
         group = dr.gather(mi.UInt32, lights.group, picked, active)
         sample = group_sample(lights, by_group, group, total, mi.luminance(direct),
@@ -164,7 +170,7 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
         direct, unshadowed,
         dr.select(lit, light.p - si.p, 0), shape_index(light.emitter.get_shape(), lit),
         dr.select(lit & shadowed, blocker.t, 0), shape_index(blocker.shape, lit & shadowed),
-        blocker.prim_index, sample)
+        blocker.prim_index, to_sun, sample)
 
 
 def added(lights: list[mi.Color3f], group: mi.UInt32, light: mi.Color3f) -> list[mi.Color3f]:
@@ -193,19 +199,25 @@ def shape_index(shape: mi.ShapePtr, active: mi.Bool) -> mi.UInt32:
     return dr.select(active, dr.reinterpret_array(mi.UInt32, shape), 0)
 
 
-def stratum_word(emitter: Any, halvings: Any, cell: Any) -> Any:
-    """A stratum in a word: a cell, row by row, of an emitter whose sides are halved so often."""
-    return emitter * 256 + halvings * 16 + cell
+def stratum_word(light: Any, halvings: Any, cell: Any) -> Any:
+    """A stratum in a word: a cell, row by row, of a light whose sides are halved so often.
+
+    light: 256 times the index of its emitter; of a sun `SUN_BIT` more.
+    """
+    return light + halvings * 16 + cell
 
 
 def contribution(scene: mi.Scene, si: mi.SurfaceInteraction3f, stratum: mi.UInt32,
-                 place: mi.Point2f, active: mi.Bool) -> tuple[mi.Color3f, mi.DirectionSample3f]:
+                 place: mi.Point2f, active: mi.Bool,
+                 sun: Sun | None) -> tuple[mi.Color3f, mi.DirectionSample3f]:
     """c_k at a place in a stratum, and the point of the light that it comes from."""
     emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), stratum >> 8, active)
-    halvings, cell = (stratum >> 4) & 15, stratum & 15  # no division: idle lanes have all bits 0
+    halvings, cell = (stratum >> 4) & 7, stratum & 15  # no division: idle lanes have all bits 0
     row, side = cell >> halvings, mi.Float(1 << halvings)
     sample = (mi.Point2f(cell - (row << halvings), row) + place) / side
     light, weight = emitter.sample_direction(si, sample, active)
+    if sun is not None:
+        light, weight = sun.told_apart(scene, si, stratum, sample, light, weight, active)
     value = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(light.d), active)
     c = dr.select(active & (light.pdf > 0), value * weight, 0) / dr.square(side)
     return c, light

@@ -4,10 +4,11 @@
 into one at first, and those that give most for each of their strata, as a mean over points of the
 scene, are cut more finely while there are strata left: at most `MOST_STRATA`, or `SPARE` beside one
 for each light. So a pixel costs what it costs with a few lights, and the sky or a large lamp among
-many small ones keeps its 16. A light at a point or from one direction has one.
+many small ones keeps its 16. A light at a point or from one direction has one. The sun of a sky is
+a light (`sun.py`).
 
 **Groups.** Those of one group seldom shine on the same place: a visibility for each group is noise
-only where two of its lights meet. With u_e the luminance that emitter e would give a point of the
+only where two of its lights meet. With u_e the luminance that light e would give a point of the
 image if nothing were in its way, the share of light that may be told wrongly there is at most the
 sum over pairs of a group of
 
@@ -30,6 +31,7 @@ from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.camera_rays import pixel_rays
 
 from .resampling import Lights, contribution, stratum_word
+from .sun import SUN_BIT, Sun, find_sun
 
 FEW = 8
 MOST_STRATA = 128
@@ -42,23 +44,26 @@ _ROUNDS = 10
 
 def find_lights(stage: MitsubaScene) -> Lights:
     """The strata of a scene's lights, in groups where it has several. May move the stage."""
-    emitters = stage.mi_scene.emitters()
-    count = len(emitters)
-    delta = np.array([mi.has_flag(e.flags(), mi.EmitterFlags.Delta) for e in emitters], bool)
+    emitters, sun = stage.mi_scene.emitters(), find_sun(stage.mi_scene)
+    delta = np.array([mi.has_flag(e.flags(), mi.EmitterFlags.Delta) for e in emitters]
+                     + [False] * (sun is not None), bool)
+    lights, count = 256 * np.arange(len(emitters)), len(delta)
+    if sun is not None:
+        lights = np.append(lights, lights[sun.emitter.numpy()[0]] + SUN_BIT)
     halvings, groups = np.where(delta, 0, 2), np.arange(count)
     if count > min(FEW, MOST_GROUPS):
         last = stage.description.frames - 1
         at = sorted({round(last * i / (_FRAMES - 1)) for i in range(_FRAMES)})
-        luminances = np.concatenate([_luminances(stage, i) for i in at], axis=1)
+        luminances = np.concatenate([_luminances(stage, i, lights, sun) for i in at], axis=1)
         if count > MOST_GROUPS:
             groups = share_out(luminances)
         if count > FEW:
             halvings = cut(luminances, delta)
-    words = [stratum_word(e, n, cell) for e, n in enumerate(halvings) for cell in range(4**n)]
+    words = [stratum_word(e, n, cell) for e, n in zip(lights, halvings) for cell in range(4**n)]
     group = np.repeat(groups, 4**halvings)
     sizes = np.bincount(group) if count > 1 else ()
     return Lights(aligned(mi.UInt32, np.array(words, np.uint32)),
-                  aligned(mi.UInt32, group.astype(np.uint32)), tuple(map(int, sizes)))
+                  aligned(mi.UInt32, group.astype(np.uint32)), tuple(map(int, sizes)), sun)
 
 
 def cut(luminances: np.ndarray, delta: np.ndarray) -> np.ndarray:
@@ -105,13 +110,14 @@ def share_out(luminances: np.ndarray, count: int = MOST_GROUPS) -> np.ndarray:
     return groups
 
 
-def _luminances(stage: MitsubaScene, index: int) -> np.ndarray:
-    """(emitters, points) of what each light would give points of a frame."""
+def _luminances(stage: MitsubaScene, index: int, lights: np.ndarray,
+                sun: Sun | None) -> np.ndarray:
+    """(lights, points) of what each light would give points of a frame."""
     stage.set_frame(index)
     scene = stage.mi_scene
-    emitters, points = len(scene.emitters()), _HEIGHT * _WIDTH
-    lane = dr.arange(mi.UInt32, emitters * points)
-    emitter, point = lane // points, lane % points
+    points = _HEIGHT * _WIDTH
+    lane = dr.arange(mi.UInt32, len(lights) * points)
+    light, point = dr.gather(mi.UInt32, mi.UInt32(lights), lane // points), lane % points
     row = point // _WIDTH
     with dr.suspend_grad():
         ray, _ = pixel_rays(stage, _HEIGHT, _WIDTH).at(
@@ -119,7 +125,7 @@ def _luminances(stage: MitsubaScene, index: int) -> np.ndarray:
         si = scene.ray_intersect(ray)
         total = mi.Float(0)
         for cell in (5, 6, 9, 10):  # the middle of the light
-            c, _ = contribution(scene, si, stratum_word(emitter, 2, cell), mi.Point2f(0.5),
-                                si.is_valid())
+            c, _ = contribution(scene, si, stratum_word(light, 2, cell), mi.Point2f(0.5),
+                                si.is_valid(), sun)
             total += mi.luminance(c)
-    return total.numpy().astype(np.float64).reshape(emitters, points)
+    return total.numpy().astype(np.float64).reshape(len(lights), points)

@@ -14,6 +14,7 @@ from onespp.denoise.inputs.surface import read_surface
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
 from onespp.denoise.methods.filtered_innovation.shadows import follow_shadows
+from onespp.render.channels import SUN
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Rectangle, Shape
 from onespp.scenes.transforms import look_at, rotate, scale, translate
@@ -51,8 +52,8 @@ def test_a_light_is_as_large_as_its_points_lie_apart(side, camera):
     """A square's points have a variance of side^2 / 12 along either side."""
     (frame,) = rendered(soft_scene(side, camera), 1)
     sizes = light_sizes(frame)
-    assert sizes.shape == (4,)
-    assert np.isinf(sizes[[0, 1, 3]]).all()  # board, floor and nobody send no light
+    assert sizes.shape == (5,)
+    assert np.isinf(sizes[[0, 1, 3, 4]]).all()  # board, floor, no sun and no sky send light
     assert sizes[2] == pytest.approx(2 * side * np.sqrt(2 / 12), rel=0.1)
 
 
@@ -111,6 +112,24 @@ def test_a_light_of_few_points_has_no_size():
     blocked, q = sharpness_of(one)
     assert blocked[y, x]
     assert q[y, x] == 0  # wide, for all that is known
+
+
+def test_the_sun_is_as_small_as_it_is_and_the_sky_around_it_is_not():
+    (frame,) = rendered(soft_scene(), 1)
+    ids = frame["light_id"].copy()
+    ids[ids == 2] = np.where(np.arange((ids == 2).sum()) % 2, SUN, -1)
+    light = np.where((ids == SUN)[..., None], frame["light"] * 0 + (0, 9, 0), frame["light"])
+    light = light - np.where((ids == SUN)[..., None], frame["position"], 0)
+    frame = replace(frame, images={**frame.images, "light_id": ids,
+                                   "light": light.astype(np.float32)})
+    sizes = light_sizes(frame)
+    assert sizes[SUN] == pytest.approx(0, abs=1e-3)
+    assert sizes[-1] > 0.3
+    blocked, q = sharpness_of(frame)
+    for id_, width in ((SUN, 1), (-1, 2)):
+        there = blocked & (ids == id_)
+        assert there.sum() > 30
+        assert (q[there] > 0.9).all() == (width == 1)
 
 
 def test_knowing_the_penumbra_lowers_the_error_of_a_first_frame():
