@@ -26,6 +26,7 @@ import drjit as dr
 
 from onespp.denoise.jit.arrays import Bool, Float
 from onespp.denoise.jit.grid import Stencil
+from onespp.render.channels import SUN
 
 
 class PenumbraSample(NamedTuple):
@@ -43,7 +44,7 @@ def penumbra_samples(stencil: Stencil, blocked: Bool, share: Float, cosine: Floa
         blocked: of `shadow_motion.stopped`. share: d / D. cosine: between the ray and the normal.
         light_id: what the ray was sent to. focal: f. sizes: of `light_sizes`.
     """
-    from_end = dr.maximum(light_id, -2) + float(dr.width(sizes))
+    from_end = dr.maximum(light_id, SUN) + float(dr.width(sizes))
     size = dr.gather(stencil.Float, sizes, stencil.UInt(
         dr.select(blocked, dr.select(light_id >= 0, light_id, from_end), 0)))
     left = dr.square((1 - share) * cosine)

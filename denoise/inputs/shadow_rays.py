@@ -12,7 +12,7 @@ from onespp.denoise.geometry.motion import inverses, world_motions
 from onespp.denoise.jit.arrays import Bool, Float, Matrix3, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.vector import dot, opaque_matrix
-from onespp.render.channels import SHADOW
+from onespp.render.channels import SHADOW, SUN
 from onespp.render.frame import Frame
 
 MATRIX_WORDS = 16      # floats
@@ -88,9 +88,10 @@ _FARTHEST = 1e15  # of a point of a light that counts
 
 def light_sizes(frame: Frame) -> np.ndarray:
     """(objects + 2,) float32: twice the standard deviation of the points of each object that shadow
-    rays asked for and, at -2 and -1, of the environment's sun and of the rest of it. Infinite for
-    less than `_FEWEST_POINTS`."""
-    count = len(frame.world_from_object) + 2
+    rays asked for and, at `SUN` and -1, of the environment's sun and of the rest of it. Infinite
+    for less than `_FEWEST_POINTS`."""
+    objects = len(frame.world_from_object)
+    count = objects - SUN
     step = max(1, round((frame.height * frame.width / _LIGHT_SAMPLES) ** 0.5))
     some = slice(step // 2, None, step)
     depth, light, id_ = (frame[name][some, some] for name in ("depth", "light", "light_id"))
@@ -100,7 +101,7 @@ def light_sizes(frame: Frame) -> np.ndarray:
     with np.errstate(invalid="ignore", over="ignore"):
         point = depth[..., None] * ray + light @ frame.camera_from_world[:3, :3].T
         good = ((frame["id"][some, some] >= 0) & (np.abs(light).sum(-1) > 0)
-                & (np.abs(point) < _FARTHEST).all(-1) & (id_ >= -2) & (id_ < count - 2))
+                & (np.abs(point) < _FARTHEST).all(-1) & (id_ >= SUN) & (id_ < objects))
     of, point = np.where(id_ < 0, count + id_, id_)[good].astype(int), point[good]
     number = np.bincount(of, minlength=count)
 

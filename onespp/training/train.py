@@ -232,8 +232,7 @@ class _Optimizer:
         adam = optax.chain(optax.clip_by_global_norm(LONGEST),
                            optax.scale_by_adam(b1=0.9, b2=0.99))
         self._jax, self._update, self._loss = jax, jax.jit(update), jax.jit(of)
-        self._weights: Any = settings.architecture.begun(settings.width,
-                                                                   settings.seed)
+        self._weights: Any = settings.architecture.begun(settings.width, settings.seed)
         self._mean: Any = self._weights
         self._moments: Any = adam.init(self._weights)
 

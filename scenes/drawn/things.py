@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -57,10 +57,9 @@ def things(draft: Plan, choices: Choices, held_out: HeldOut | None, speed: float
                                         choices.sharp or draft.lamps_are_found)
         move = choices.motions[random.integers(len(choices.motions))]
         mesh = mesh_of(kind) if kind in _meshes(choices, held_out) else None
-        thing = _thing(random, draft, i, kind if mesh is None else MESH, material, move, speed,
-                       free, mesh)
+        thing = _thing(random, draft, i, kind, mesh, material, move, speed, free)
         if thing is not None:
-            found.append(replace(thing, object=kind))
+            found.append(thing)
     return found, free
 
 
@@ -87,9 +86,9 @@ def _meshes(choices: Choices, held_out: HeldOut | None) -> tuple[str, ...]:
     return choices.meshes + (held_out.meshes if held_out is not None else ())
 
 
-def _thing(random: np.random.Generator, draft: Plan, i: int, kind: str, material: str, move: str,
-           speed: float, free: Free, mesh: Mesh | None) -> Thing | None:
-    """None where there is no room for it."""
+def _thing(random: np.random.Generator, draft: Plan, i: int, kind: str, mesh: Mesh | None,
+           material: str, move: str, speed: float, free: Free) -> Thing | None:
+    """None where there is no room for it. mesh: of the file `kind`, None for a kind of ours."""
     size = random.uniform(0.7, 1.0) if move in _ACTIVE else random.uniform(0.8, 1.7)
     made = _body(random, kind, size) if mesh is None else _standing(random, mesh, size)
     surface = surfaces.surface(random, material, draft.colors[i % len(draft.colors)],
@@ -107,7 +106,8 @@ def _thing(random: np.random.Generator, draft: Plan, i: int, kind: str, material
             return None
         there = translate((spot[0], 0, spot[1]))
         where = there @ stand if motion is None else compose(there, motion, stand)
-    return Thing(Shape(f"{kind}_{i}", made.geometry, surface, where), kind, material, move)
+    name = f"{kind if mesh is None else MESH}_{i}"
+    return Thing(Shape(name, made.geometry, surface, where), kind, material, move)
 
 
 def _faster(motion: Animation, speed: float) -> Animation:

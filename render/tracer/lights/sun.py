@@ -67,16 +67,14 @@ class Sun:
         row = cell // _SIDE
         d = self.direction((mi.Float(row) + place - share) / _SIDE,
                            (mi.Float(cell - row * _SIDE) + sample.y) / _SIDE)
-        seen = dr.zeros(mi.SurfaceInteraction3f)
-        seen.wi, seen.wavelengths, seen.time = -d, si.wavelengths, si.time
         environment = scene.environment()
-        radiance = environment.eval(seen, active)
         light.d = dr.select(of_sun, d, light.d)
         light.p = dr.select(of_sun, si.p + light.dist * d, light.p)
         light.n = dr.select(of_sun, -d, light.n)
         light.pdf = dr.select(of_sun, environment.pdf_direction(si, light, active), light.pdf)
         one_over_density = dr.pi * self.square * (_SHARES / _SIDE**2) / (word // _SIDE**2)
-        return light, dr.select(of_sun, radiance * one_over_density, weight)
+        return light, dr.select(of_sun, _radiance(environment, d, active) * one_over_density,
+                                weight)
 
     def direction(self, u: mi.Float, v: mi.Float) -> mi.Vector3f:
         """w."""
@@ -119,11 +117,16 @@ def _places(rows: int, columns: int) -> tuple[mi.Float, mi.Float]:
 
 def _luminances(environment: mi.Emitter, d: mi.Vector3f) -> np.ndarray:
     """(n,) float64, from n directions."""
+    with dr.suspend_grad():
+        light = mi.luminance(_radiance(environment, d)).numpy().astype(np.float64)
+    return np.broadcast_to(light, dr.width(d))
+
+
+def _radiance(environment: mi.Emitter, d: mi.Vector3f, active: mi.Bool | bool = True) -> mi.Color3f:
+    """L of directions."""
     seen = dr.zeros(mi.SurfaceInteraction3f)
     seen.wi = -d
-    with dr.suspend_grad():
-        light = mi.luminance(environment.eval(seen)).numpy().astype(np.float64)
-    return np.broadcast_to(light, dr.width(d))
+    return environment.eval(seen, active)
 
 
 def shared_out(light: np.ndarray) -> np.ndarray:
