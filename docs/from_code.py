@@ -31,6 +31,9 @@ from onespp.scenes import catalog
 from onespp.scenes.hard import HARD
 
 HEADER = re.compile(r"^(Sources?|Departures|Symbols)\b.*:", re.M)
+SOURCES = re.compile(r"^Sources?:(.*?)(?:\n\n|\Z)", re.M | re.S)
+WORK = re.compile(r"GAMES202|[A-Z][\w, .-]{0,60}? \d{4}\b")
+DOI = r"doi:(10\.[^\s,;)]*[^\s,;).:])"
 RANGE = re.compile(r"^(?:(?:above|at least) )?[-+.\deE]+(?: to [-+.\deE]+)?$")
 
 
@@ -87,7 +90,23 @@ def markdown_of(docstring: str) -> str:
     text = inspect.cleandoc(docstring).partition("\n")[2].strip("\n")
     text = re.sub(r"^(Sources?|Departures[^:\n]*|Symbols|Form|Order):", r"**\1:**", text,
                   flags=re.M)
-    return re.sub(r"doi:(10\.[^\s,;)]*[^\s,;).:])", r"[doi:\1](https://doi.org/\1)", text)
+    return re.sub(DOI, r"[doi:\1](https://doi.org/\1)", text)
+
+
+def cited(name: str) -> str:
+    """The works that a method's module names as its sources, in short; what a peer is.
+
+    Of a piece between semicolons that begins with authors and a year, or with the course.
+    """
+    if name in PEERS:
+        return PEERS[name].about.removesuffix(".")
+    found = SOURCES.search(sys.modules[METHODS[name].__module__].__doc__ or "")
+    works = []
+    for piece in " ".join(found[1].split()).split("; ") if found else ():
+        if work := WORK.match(piece):
+            doi = re.search(DOI, piece)
+            works.append(f"[{work[0]}](https://doi.org/{doi[1]})" if doi else work[0])
+    return "; ".join(works) or "ours"
 
 
 def table(heads: Iterable[str], rows: Iterable[Iterable[object]]) -> str:

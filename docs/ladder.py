@@ -11,20 +11,18 @@ it measures is filled in. The sequence is kept in data/ladder, and so are its re
 
 from __future__ import annotations
 
-import io
 import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 
 import click
 import numpy as np
+from pictures import beside_error, jpeg
 from results import ROOT, denoise, render, say, scores_in, table
 
 from onespp.denoise.catalog import build
 from onespp.denoise.metrics.table import HEADLINE
-from onespp.denoise.metrics.tonemap import bytes_from_linear
-from onespp.denoise.report.contact_sheets import display_error
-from onespp.denoise.report.panels import error_legend, error_picture, resize
+from onespp.denoise.report.panels import error_legend
 from onespp.denoise.run.interleaved_timing import time_methods
 from onespp.denoise.score.scorecard import INPUT
 from onespp.render.cli.options import use
@@ -33,7 +31,7 @@ from onespp.render.files.atomic import write_bytes, write_text
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import FrameSequence
 
-QUALITY, SHOWN = 75, 512  # of the JPEG files; width in pixels at which the page shows them
+SHOWN = 512  # width in pixels at which the page shows the pictures
 
 
 @dataclass(frozen=True)
@@ -164,18 +162,11 @@ class Ladder:
 
     def picture(self, image: np.ndarray) -> bytes:
         """The image, and its error beside it."""
-        return jpeg(np.hstack([bytes_from_linear(image),
-                               error_picture(display_error(image, self.reference))]))
+        return jpeg(beside_error([image], self.reference))
 
     @staticmethod
     def image(name: str, about: str) -> str:
         return f'<img src="ladder/{name}.jpg" alt="{about}" width="{SHOWN}">'
-
-
-def jpeg(picture: np.ndarray) -> bytes:
-    file = io.BytesIO()
-    resize(picture, picture.shape[:2]).save(file, format="JPEG", quality=QUALITY)
-    return file.getvalue()
 
 
 PAGE = """\

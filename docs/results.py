@@ -1,10 +1,10 @@
-"""Prints the tables of README.md and docs/results.md, or writes them there (`--write`).
+"""Prints the tables of README.md and of two pages of the docs, or writes them there (`--write`).
 
     python docs/results.py                         # an hour on two cores
     python docs/results.py --frames 0:2 --box-size 48x48 --room-size 48x27 --reference-spp 16 \\
         --parts scores --data build/tiny           # a minute, to see that it works
 
-Each part is a block `<!-- results:NAME -->` ... `<!-- /results -->` in one of the two files. A part
+Each part is a block `<!-- results:NAME -->` ... `<!-- /results -->` in one of the files. A part
 renders what it needs, denoises and scores it by the library, and says what its numbers stand on:
 frames, size, samples of the reference, seed, tone map, the input's own score. What is quadratic is
 by halves of the reference, and has no floor but a standard error (±).
@@ -17,13 +17,15 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import pairwise
 from pathlib import Path
 
 import click
+import failures
+import from_code
 import numpy as np
 
 import onespp  # noqa: F401 - finds LLVM before anything imports Dr.Jit
@@ -46,6 +48,7 @@ from onespp.render.cli.arguments import parse_size
 from onespp.render.cli.options import use
 from onespp.render.cli.terminal import run as run_command
 from onespp.render.errors import InputError
+from onespp.render.files.atomic import write_bytes
 from onespp.render.files.frame_ranges import format_frames, parse_frames
 from onespp.render.files.lock import writing
 from onespp.render.files.sequence import FrameSequence
@@ -96,8 +99,12 @@ class Plan:
     @cached_property
     def pairs(self) -> dict[str, tuple[Scores, Scores]]:
         """Scene -> scores on the plain input, and on ours."""
-        return {scene: (self.scored(scene, plain=True), self.scored(scene))
-                for scene in self.sizes}
+        return {scene: (self.scored(scene, plain=True), self.ours[scene]) for scene in self.sizes}
+
+    @cached_property
+    def ours(self) -> dict[str, Scores]:
+        """Scene -> scores on our input, with times in turns."""
+        return {scene: self.scored(scene) for scene in self.sizes}
 
     def scored(self, scene: str, plain: bool = False) -> Scores:
         """Scores of all methods on one of the two scenes; on ours, with times in turns."""
@@ -137,29 +144,41 @@ class Plan:
 
     @cached_property
     def light(self) -> dict[str, Scores]:
-        """Name -> scores of the generated scenes that are kept to check with."""
-        found = {}
-        for name in (catalog.GENERATED[i] for i in KEPT):
-            sequence = render(self.data / name, name, LIGHT_FRAMES, LIGHT_SIZE, self.others_spp, 5,
-                              added=())
-            known = all_methods(sequence)
-            denoise(sequence, {m: known[m] for m in (BEST, "svgf", *OIDN_FORMS) if m in known},
-                    self.again)
-            found[name] = scores_of(sequence)
-        return found
+        """Name -> scores of all methods on the generated scenes that are kept to check with."""
+        return {name: self.scored_by_all(render(self.data / name, name, LIGHT_FRAMES, LIGHT_SIZE,
+                                                self.others_spp, 5))
+                for name in (catalog.GENERATED[i] for i in KEPT)}
+
+    @cached_property
+    def hard_scores(self) -> dict[str, Scores]:
+        """Name -> scores of all methods on the hard scenes."""
+        return {name: self.scored_by_all(self.hard_sequence(name)) for name in self.hard}
+
+    @cached_property
+    def worst(self) -> dict[str, failures.Failure]:
+        """Method -> where among the hard scenes it is farthest behind the mean of ours."""
+        return {name: failures.find(self.hard_scores, name, METHODS)
+                for name in names_in(self.hard_scores.values()) if name != INPUT}
 
     @cached_property
     def hard_rows(self) -> list[hard_study.Row]:
-        """Every method on the hard scenes."""
+        """What the history of every method of ours is worth on the hard scenes."""
         rows = []
-        needed = sorted({c for method in METHODS.values() for c in method.needs})
         for name in self.hard:
-            known, scene = HARD[name], HARD[name].make()
-            sequence = render(self.data / "hard" / name, f"hard/{name}", f"0:{scene.frames}",
-                              f"{scene.width}x{scene.height}", self.hard_spp, 0, added=needed)
+            sequence = self.hard_sequence(name)
             say(f"hard/{name}: judge")
-            rows += hard_study.judge(sequence, name, known.event, known.diffuse)
+            rows += hard_study.judge(sequence, name, HARD[name].event, HARD[name].diffuse)
         return rows
+
+    def hard_sequence(self, name: str) -> FrameSequence:
+        scene = HARD[name].make()
+        needed = sorted({c for method in METHODS.values() for c in method.needs})
+        return render(self.data / "hard" / name, f"hard/{name}", f"0:{scene.frames}",
+                      f"{scene.width}x{scene.height}", self.hard_spp, 0, added=needed)
+
+    def scored_by_all(self, sequence: FrameSequence) -> Scores:
+        denoise(sequence, all_methods(sequence), self.again)
+        return scores_of(sequence)
 
 
 def say(text: str) -> None:
@@ -240,11 +259,17 @@ def scores_of(sequence: FrameSequence) -> Scores:
 
 def number(score: MethodScore | None, measure: str, form: str) -> str:
     """With its standard error, if that shows; `≥` marks a bound."""
-    value = score[measure] if score else None
-    if score is None or value is None:
+    return mean_number([score] if score else [], measure, form)
+
+
+def mean_number(scores: Sequence[MethodScore], measure: str, form: str) -> str:
+    """Mean over scores, as `number` writes one; "" where one of them has none."""
+    values = [v for score in scores if (v := score[measure]) is not None]
+    if not values or len(values) < len(scores):
         return ""
-    text = ("≥ " if measure in score.bounds else "") + format(value, form)
-    error = format(score.errors.get(measure, 0.0), form)
+    text = ("≥ " if any(measure in score.bounds for score in scores) else "") + format(
+        np.mean(values), form)
+    error = format(np.linalg.norm([s.errors.get(measure, 0.0) for s in scores]) / len(scores), form)
     return f"{text} ±{error}" if float(error) else text
 
 
@@ -299,7 +324,7 @@ def names_in(scores: Iterable[Scores]) -> list[str]:
 
 
 def summary(plan: Plan) -> str:
-    ours = {scene: pair[1] for scene, pair in plan.pairs.items()}
+    ours = plan.ours
     heads = ["method", *(f"{scene} {what}" for scene in ours
                          for what in ("PSNR", "FLIP", "flicker", "ms"))]
     rows = [[named(name), *(cell for scores in ours.values() for cell in _four(scores, name))]
@@ -367,8 +392,55 @@ def light(plan: Plan) -> str:
             cells += [f"{leads[-1]:+.2f}", f"{a / b:.2f}" if a and b else ""]
         rows.append([f"`{name}`", *cells])
     mean = f" Mean lead {np.mean(leads):+.2f} dB, least {min(leads):+.2f}." if leads else ""
-    return (f"{table(heads, rows)}\n\nPSNR in dB on {TONE_MAP}, mean over frames {LIGHT_FRAMES} at "
-            f"{LIGHT_SIZE}, references {plan.others_spp} spp in halves, seed 5.{mean}")
+    return (f"{table(heads, rows)}\n\nPSNR in dB on {TONE_MAP}, mean over "
+            f"{_light_conditions(plan)}.{mean}")
+
+
+def _light_conditions(plan: Plan) -> str:
+    return (f"frames {LIGHT_FRAMES} at {LIGHT_SIZE}, references {plan.others_spp} spp in halves, "
+            "seed 5")
+
+
+def methods(plan: Plan) -> str:
+    """A row a method: where it is from, what it is worth, where it fails."""
+    kept = plan.light.values()
+    heads = ["method", "source", "kept scenes, PSNR", "FLIP", "flicker",
+             *(head for scene in plan.ours for head in (scene, "ms")), "fails most on"]
+    rows = []
+    for name in names_in([*plan.ours.values(), *kept]):
+        found = [s.methods[name] for s in kept if name in s.methods]
+        row = [named(name), from_code.cited(name) if name != INPUT else "",
+               *(mean_number(found, measure, form) if len(found) == len(kept) else ""
+                 for measure, form in (("psnr_srgb", ".2f"), ("flip", ".3f"), ("flicker", ".3f")))]
+        for scores in plan.ours.values():
+            psnr, _, _, ms = _four(scores, name)
+            row += [psnr, ms]
+        failure = plan.worst.get(name)
+        rows.append([*row, f"`{failure.scene}`, frame {failure.frame}" if failure else ""])
+    floors = [s.flip_floor for s in kept if s.flip_floor is not None]
+    floor = f" (floor of FLIP {np.mean(floors):.3f})" if len(floors) == len(kept) else ""
+    first, *_, last = plan.light
+    return (f"{table(heads, rows)}\n\nPSNR in dB on {TONE_MAP}, mean over frames, ± a standard "
+            f"error by the noise of the reference. Kept scenes: mean over {len(kept)} scenes, "
+            f"`{first}` to `{last}`, {_light_conditions(plan)}{floor}; "
+            f"{'; '.join(map(conditions, plan.ours.values()))}; {machine_of(plan)}.")
+
+
+def what_fails(plan: Plan) -> str:
+    """A sentence and a picture a method."""
+    shown = [failures.markdown(name, failure, HARD[failure.scene].make().about)
+             for name, failure in plan.worst.items()]
+    return "\n\n".join([*shown, _hard_conditions(plan)])
+
+
+def draw_failures(plan: Plan, folder: Path) -> None:
+    """The pictures that `what_fails` shows, and no others."""
+    for name, failure in plan.worst.items():
+        write_bytes(folder / f"{name}.jpg", failures.picture(
+            FrameSequence.open(plan.data / "hard" / failure.scene), name, failure.frame, METHODS))
+    for old in folder.glob("*.jpg"):
+        if old.stem not in plan.worst:
+            old.unlink()
 
 
 def _three(score: MethodScore | None) -> str:
@@ -418,6 +490,8 @@ PARTS: dict[str, tuple[Path, Callable[[Plan], str]]] = {
     "ablation": (ROOT / "docs/results.md", ablation),
     "hard-onespp": (ROOT / "docs/results.md", hard_of_best),
     "hard": (ROOT / "docs/results.md", hard),
+    "methods": (ROOT / "docs/methods.md", methods),
+    "failures": (ROOT / "docs/methods.md", what_fails),
 }
 
 
@@ -435,15 +509,13 @@ def replaced(page: str, name: str, new: str) -> str:
 
 def own_command(name: str, plan: Plan) -> str:
     """The command line that prints a part."""
-    if name in ("others", "light"):
-        given = f"--others-spp {plan.others_spp}"
-    elif name.startswith("hard"):
-        given = f"--hard-spp {plan.hard_spp}" + "".join(
-            f" --hard {scene}" for scene in plan.hard if plan.hard != tuple(HARD))
-    else:
-        sizes = " ".join(f"--{scene}-size {size}" for scene, size in plan.sizes.items())
-        given = (f"--frames {plan.frames} {sizes} --reference-spp {plan.spp} "
-                 f"--seed {plan.seed}")
+    sizes = " ".join(f"--{scene}-size {size}" for scene, size in plan.sizes.items())
+    two = f"--frames {plan.frames} {sizes} --reference-spp {plan.spp} --seed {plan.seed}"
+    others = f"--others-spp {plan.others_spp}"
+    hard = f"--hard-spp {plan.hard_spp}" + "".join(
+        f" --hard {scene}" for scene in plan.hard if plan.hard != tuple(HARD))
+    given = {"others": others, "light": others, "hard-onespp": hard, "hard": hard,
+             "failures": hard, "methods": f"{two} {others} {hard}"}.get(name, two)
     return f"python docs/results.py --parts {name} {given}"
 
 
@@ -467,12 +539,12 @@ def own_command(name: str, plan: Plan) -> str:
               metavar="DIR", help="Folder of the sequences; default data/results.")
 @click.option("--again", is_flag=True, help="Denoise and time anew; renders are kept.")
 @click.option("--write", is_flag=True,
-              help="Write the tables to README.md and docs/results.md, and the plot.")
+              help="Write the tables into README.md and the docs, and the pictures with them.")
 @click.option("--threads", type=int, metavar="N", help="CPU threads; default all.")
 def results(parts: str, frames: str, box_size: str, room_size: str, reference_spp: int,
             others_spp: int, hard_spp: int, seed: int, hard_names: tuple[str, ...], data: Path,
             again: bool, write: bool, threads: int | None) -> None:
-    """Print the tables of README.md and docs/results.md as Markdown."""
+    """Print the tables of README.md and the docs as Markdown."""
     names = [name.strip() for name in parts.split(",") if name.strip()]
     unknown = [name for name in names if name not in PARTS]
     if unknown or not names:
@@ -494,6 +566,8 @@ def results(parts: str, frames: str, box_size: str, room_size: str, reference_sp
         shown = {name: s for name, s in scores.methods.items() if name not in NOT_PLOTTED}
         plot_speed_against_error(scores.model_copy(update={"methods": shown}),
                                  ROOT / "docs/speed_box.png")
+    if write and "failures" in names:
+        draw_failures(plan, ROOT / "docs/failures")
 
 
 if __name__ == "__main__":
