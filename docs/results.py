@@ -419,10 +419,10 @@ def methods(plan: Plan) -> str:
         rows.append([*row, f"`{failure.scene}`, frame {failure.frame}" if failure else ""])
     floors = [s.flip_floor for s in kept if s.flip_floor is not None]
     floor = f" (floor of FLIP {np.mean(floors):.3f})" if len(floors) == len(kept) else ""
-    first, *_, last = plan.light
+    names = [*plan.light]
     return (f"{table(heads, rows)}\n\nPSNR in dB on {TONE_MAP}, mean over frames, ± a standard "
             f"error by the noise of the reference. Kept scenes: mean over {len(kept)} scenes, "
-            f"`{first}` to `{last}`, {_light_conditions(plan)}{floor}; "
+            f"`{names[0]}` to `{names[-1]}`, {_light_conditions(plan)}{floor}; "
             f"{'; '.join(map(conditions, plan.ours.values()))}; {machine_of(plan)}.")
 
 

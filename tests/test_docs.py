@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+import io
 import re
 import shlex
 import sys
@@ -16,10 +17,13 @@ from types import ModuleType
 
 import click
 import draw_architecture
+import failures
 import from_code
 import ladder
+import numpy as np
 import pytest
 import results
+from PIL import Image
 from sphinx.cmd.build import build_main
 
 import onespp.cli
@@ -31,6 +35,8 @@ from onespp.denoise.methods.outliers import RemoveOutliers
 from onespp.denoise.methods.parameters import pairs
 from onespp.denoise.metrics.table import MEASURES
 from onespp.denoise.metrics.tonemap import srgb_from_linear
+from onespp.denoise.score.method_score import INPUT, MethodScore
+from onespp.denoise.score.scorecard import Scores
 from onespp.denoise.score.sequence import score
 from onespp.render.errors import InputError
 from onespp.user_code import is_file
@@ -413,7 +419,7 @@ def test_examples_of_docstrings_run():
 
 
 def test_every_block_of_results_has_a_part_and_every_part_a_block():
-    for path in (ROOT / "README.md", DOCS / "results.md"):
+    for path in (ROOT / "README.md", DOCS / "results.md", DOCS / "methods.md"):
         found = re.findall(r"<!-- results:([\w-]+) -->", path.read_text("utf-8"))
         assert found == [name for name, (where, _) in results.PARTS.items() if where == path]
 
@@ -432,11 +438,16 @@ def test_the_ladder_is_what_its_command_writes_but_for_the_numbers(tmp_path):
     assert sum(path.stat().st_size for path in (DOCS / "ladder").iterdir()) < 150_000
 
 
+@pytest.fixture(scope="module")
+def scores(tmp_path_factory) -> Scores:
+    return score(make_report_sequence(tmp_path_factory.mktemp("made") / "made"))
+
+
 @pytest.fixture
-def plan(tmp_path) -> results.Plan:
+def plan(tmp_path, scores) -> results.Plan:
     """A plan whose scenes were rendered and scored already."""
-    scores = score(make_report_sequence(tmp_path / "made"))
     plan = results.Plan("0:4", {"made": "48x32"}, 256, 8, 8, 0, ("cut",), tmp_path, False)
+    plan.__dict__["ours"] = {"made": scores}
     plan.__dict__["pairs"] = {"made": (scores, scores)}
     plan.__dict__["others"] = {"a scene": scores}
     return plan
@@ -460,6 +471,85 @@ def test_writing_replaces_one_block_and_no_more():
         "<!-- results:x -->\nold\n<!-- /results -->", new)
     with pytest.raises(InputError, match="results:z"):
         results.replaced(page, "z", new)
+
+
+def with_decibels(scores: Scores, decibels: dict[str, list[float | None]]) -> Scores:
+    """Scores of methods that have these PSNRs, a frame each, and their mean."""
+    like, made = scores.methods["fine"].model_dump(), {INPUT: scores.methods[INPUT]}
+    for name, values in decibels.items():
+        made[name] = MethodScore.model_validate({
+            **like, "psnr_srgb": np.mean([v for v in values if v is not None]),
+            "per_frame": [{**row, "psnr_srgb": v} for row, v in zip(like["per_frame"], values)]})
+    return scores.model_copy(update={"methods": made})
+
+
+@pytest.fixture
+def measured(plan, scores) -> results.Plan:
+    """A plan that has all that the page of the methods shows."""
+    plan.__dict__["light"] = {
+        f"generated/{i}": with_decibels(scores, {"gaussian": [i], "svgf": [2 * i]})
+        for i in (12, 14, 22)}
+    plan.__dict__["hard_scores"] = {
+        "cut": with_decibels(scores, {"gaussian": [10, 10], "atrous": [30, 30], "svgf": [30, 20],
+                                      "oidn-high": [None, 50]}),
+        "thin": with_decibels(scores, {"gaussian": [15, 15], "atrous": [20, 38], "svgf": [40, 40],
+                                       "oidn-high": [60, 60]})}
+    return plan
+
+
+def test_a_failure_is_where_a_method_is_farthest_behind_the_mean_of_ours(measured):
+    # Means of ours: of cut 65/3, its frames 70/3 and 20; of thin 28, its frames 25 and 31.
+    assert {name: (f.scene, f.frame) for name, f in measured.worst.items()} == {
+        "gaussian": ("thin", 1), "atrous": ("thin", 0), "svgf": ("cut", 1), "oidn-high": ("cut", 1)}
+    found = measured.worst["atrous"]
+    assert (found.lead, found.psnr, found.mean) == (1, 20, 25)
+    assert found.usual == pytest.approx((1 + 30 - 65 / 3) / 2)
+    said = " ".join(results.what_fails(measured).split())
+    assert "13.0 dB behind the mean of our methods, 12.3 dB behind it over all scenes" in said
+
+
+def test_the_table_of_all_methods_says_source_worth_and_failure(measured):
+    rows = {line.split(" | ")[0]: line for line in results.methods(measured).splitlines()}
+    assert list(rows)[2] == "| input, 1 spp"
+    assert rows["| `svgf`"].startswith("| `svgf` | [Schied et al. 2017](https://doi.org/10.1145/"
+                                       "3105762.3105770) | 32.00 |")
+    assert rows["| `svgf`"].endswith("| `cut`, frame 1 |")
+    assert "3 scenes, `generated/12` to `generated/22`" in results.methods(measured)
+
+
+def test_every_method_names_its_source_or_is_ours():
+    own = {name for name in METHODS if from_code.cited(name) == "ours"}
+    assert own == {name for name in METHODS if name.startswith("onespp")}
+    assert all(re.search(r"GAMES202| \d{4}\b", from_code.cited(m)) for m in {*METHODS} - own)
+
+
+def test_the_picture_of_a_failure_is_of_the_place_where_others_do_better(tmp_path, monkeypatch):
+    monkeypatch.setattr(failures, "WINDOW", (12, 16))
+    sequence = make_report_sequence(tmp_path / "hard/cut", 1)
+    wrong = sequence.read_reference(0).color.copy()
+    wrong[:12, :16] = 9  # by all
+    sequence.write_result("rough", 0, wrong)
+    wrong[20:, 32:] = 9
+    sequence.write_result("fine", 0, wrong)
+    data = failures.picture(sequence, "fine", 0, ["rough"])
+    shown = np.asarray(Image.open(io.BytesIO(data)), float)[::failures.SCALE, ::failures.SCALE]
+    image, reference, error = np.split(shown, 3, axis=1)
+    assert image.shape == (12, 16, 3)
+    assert image.min() > 240 > reference.mean()
+    assert error.mean() > 100
+
+
+def test_pictures_of_failures_are_those_that_the_page_shows():
+    shown = re.findall(r'src="failures/([\w-]+).jpg"', PAGES["methods.md"].read_text("utf-8"))
+    files = [*(DOCS / "failures").glob("*")]
+    assert {path.name for path in files} == {f"{name}.jpg" for name in shown}
+    assert sum(path.stat().st_size for path in files) < 400_000
+
+
+def test_the_commands_that_are_printed_under_tables_parse(plan):
+    two = replace(plan, sizes={"box": "48x32", "room": "48x32"})
+    for name in results.PARTS:
+        check_command(shlex.split(results.own_command(name, two)))
 
 
 @pytest.mark.slow
