@@ -30,7 +30,7 @@ docs: .venv/installed-docs
 	@echo "Look at build/docs/index.html."
 
 # All tables of README.md and docs/results.md: an hour on two cores, most of it references; it resumes.
-# `make results ARGS=--write` writes the tables into the two files.
+# `make results ARGS=--write` writes the tables, and the pictures with them, into README.md and the docs.
 results: .venv/installed-dev
 	$(BIN)/python docs/results.py $(ARGS)
 

@@ -527,15 +527,15 @@ def test_the_picture_of_a_failure_is_of_the_place_where_others_do_better(tmp_pat
     monkeypatch.setattr(failures, "WINDOW", (12, 16))
     sequence = make_report_sequence(tmp_path / "hard/cut", 1)
     wrong = sequence.read_reference(0).color.copy()
-    wrong[:12, :16] = 9  # by all
+    wrong[20:, 32:] = 9  # by both, and farther off, since it is dark there
     sequence.write_result("rough", 0, wrong)
-    wrong[20:, 32:] = 9
+    wrong[:12, :16] = 9
     sequence.write_result("fine", 0, wrong)
     data = failures.picture(sequence, "fine", 0, ["rough"])
     shown = np.asarray(Image.open(io.BytesIO(data)), float)[::failures.SCALE, ::failures.SCALE]
     image, reference, error = np.split(shown, 3, axis=1)
     assert image.shape == (12, 16, 3)
-    assert image.min() > 240 > reference.mean()
+    assert image.min() > 240 > reference.mean() > 130
     assert error.mean() > 100
 
 
