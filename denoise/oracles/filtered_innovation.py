@@ -138,9 +138,11 @@ def spread(frame: Frame, energy: np.ndarray, counts: np.ndarray, levels: int, m,
 
 
 def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, sigma: np.ndarray,
-           fade: np.ndarray, narrow: np.ndarray, m, counts: np.ndarray | None = None) -> np.ndarray:
+           fade: np.ndarray, narrow: np.ndarray, m, counts: np.ndarray | None = None,
+           theirs: float = 0.1) -> np.ndarray:
     """The last filter; its last level's taps are weaker by `fade`, all by exp(-narrow r^2), and a
-    pixel weighs as much as it counts. It compares the first three components, or the only one."""
+    pixel weighs as much as it counts. It compares the first three components, or the only one, by
+    the pixel's variance and a share, `theirs`, of what a neighbour has more."""
     shape = frame["id"].shape
     counts = np.ones(shape) if counts is None else counts
     for i in range(levels):
@@ -156,7 +158,8 @@ def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, s
                     continue
                 w = geometry(p, q, dy, dx, m)
                 if dy or dx:
-                    deviations = (lum(q.x[..., :3]) - lum(p.x[..., :3])) / (np.sqrt(p.v) + 1e-6)
+                    noise = p.v + theirs * np.maximum(q.v - p.v, 0)
+                    deviations = (lum(q.x[..., :3]) - lum(p.x[..., :3])) / np.sqrt(noise + 1e-12)
                     w = w * p.fade * np.exp(-(deviations / p.sigma) ** 2
                                             - p.narrow * (dy * dy + dx * dx) * 4**i)
                 alike[where] += w
@@ -423,7 +426,8 @@ def run(frames: list[Frame], m) -> np.ndarray:
                 least = min(m.mirror_sigma / sigma, 1)
                 sigmas = sigma * np.clip(roughness_of(frame) / 0.1, least, 1)
             out[name] = guided(frame, history, s2, levels, sigmas, fade, narrow, m,
-                               np.clip(samples, 1e-5, 1) if sparse else None)
+                               np.clip(samples, 1e-5, 1) if sparse else None,
+                               0.1 if name in ("L", "G") else 0)
             if sparse:
                 history = np.where(samples[..., None] > 1e-5, history, out[name])
             kept[name] = history, s2, np.minimum(samples, 64)

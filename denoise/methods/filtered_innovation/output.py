@@ -22,6 +22,7 @@ from .smoothing import footprint
 
 FEWEST_SAMPLES = 1e-5          # that a sparse signal's pixel counts for where it has none
 WIDE_LOBE = 0.1                # roughness: such a lobe blurs an image as far as the filter does
+NEIGHBOURS_NOISE = 0.1         # share of a noisier neighbour's variance beyond the pixel's own
 _NEVER = -1e3                  # log2 of a weight that is 0
 
 
@@ -49,17 +50,18 @@ def output_level(layout: SignalLayout, level: int, values: Taps[list[NoisySignal
     left, center = layout.output_level(level), values.at(-1)
     rules = [_Rule.of(layout, s, level, falloff, spacing) for s in left]
     sums = [_start(c, h0) for c in center]
-    scales = [sigma / (dr.sqrt(c.variance) + EPSILON) for c, sigma in zip(center, sigmas)]
     if falloff.narrowed is not None:
-        scales = [scale * falloff.narrowed if layout.kinds[s] is SignalKind.GLOSSY else scale
-                  for s, scale in zip(left, scales)]
+        sigmas = [sigma * falloff.narrowed if kind is SignalKind.GLOSSY else sigma
+                  for kind, sigma in zip(layout.kinds, sigmas)]
     totals: list[Float] = [type(plane.dx)(h0) if c.samples is None else h0 * c.samples
                            for c in center]
     for i, offset in enumerate(window(1)):
         taps, surface_x = values.at(i), exponent(i, offset)
         for s, tap in zip(left, taps, strict=True):
-            distance = (tap.signal.luminance - center[s].signal.luminance) * scales[s]
-            x = rules[s].nearer(dr.fma(distance, -distance, surface_x), offset)
+            c = center[s]
+            noise = rules[s].noise(c.variance, tap.variance)
+            distance = (tap.signal.luminance - c.signal.luminance) * sigmas[s]
+            x = rules[s].nearer(surface_x - dr.square(distance) * (1 / (noise + EPSILON**2)), offset)
             fade = rules[s].fade
             w = exp2(x if fade is None else x + fade)
             samples = sums[s].samples
@@ -86,10 +88,21 @@ def narrowed(roughness: Float, mirror: Float) -> Float:
 
 
 class _Rule(NamedTuple):
-    """How a signal's taps are weakened: by distance, and at the last level."""
+    """How a signal's taps are weakened: by distance, and at the last level; and the variance that
+    they are judged by.
+
+    Judged by the pixel's own, a bright pixel, which is noisy, takes from dark ones what they do not
+    take from it, and light is lost. So light counts some of the neighbour's. Visibility does not:
+    a shadow's edge is noisier than what it is the edge of.
+    """
 
     nearer: Callable[[Float, Offset], Float]
     fade: Float | None
+    symmetric: bool
+
+    def noise(self, own: Float, neighbours: Float) -> Float:
+        return (dr.fma(NEIGHBOURS_NOISE, dr.maximum(neighbours - own, 0), own) if self.symmetric
+                else own)
 
     @staticmethod
     def of(layout: SignalLayout, s: int, level: int, falloff: OutputFalloff,
@@ -97,7 +110,8 @@ class _Rule(NamedTuple):
         f, g = layout.follower(s), layout.group(s)
         fade = falloff.fades[s] if g is None else falloff.sparse_fades[g]
         return _Rule(footprint(None if f is None else falloff.footprints[f], spacing),
-                     fade if layout.is_last_level(s, level) else None)
+                     fade if layout.is_last_level(s, level) else None,
+                     layout.kinds[s] is not SignalKind.VISIBILITY)
 
 
 def _start(center: NoisySignal, h0: float) -> NoisySignal:
