@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 
@@ -17,3 +18,17 @@ class Progress(Protocol):
 
 def silent(done: float, total: float, what: str, note: str = "", /) -> None:
     """Progress that nobody follows."""
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Since when one part of the job is followed, in seconds, and how far it was then: what a run
+    that was stopped had done before takes no time now."""
+
+    begun: float
+    first: float
+
+    def left(self, now: float, done: float, total: float) -> float:
+        """Seconds that the rest will take; 0 while nothing tells."""
+        steps = done - self.first
+        return (now - self.begun) * (total - done) / steps if steps > 0 else 0

@@ -18,7 +18,7 @@ from typing import ParamSpec, TextIO, TypeVar
 
 from onespp.render.errors import InputError
 from onespp.render.host.turns import check_process
-from onespp.render.progress import Progress, silent
+from onespp.render.progress import Pace, Progress, silent
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -52,16 +52,16 @@ class Line:
 
     def __init__(self, stream: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
         self._stream, self._clock = stream, clock
-        self._begun: dict[str, float] = {}
+        self._paces: dict[str, Pace] = {}
         self._shown, self._length = float("-inf"), 0
 
     def __call__(self, done: float, total: float, what: str, note: str = "", /) -> None:
         now = self._clock()
-        begun = self._begun.setdefault(what, now)
+        pace = self._paces.setdefault(what, Pace(now, done))
         if done < total and now - self._shown < SECONDS_BETWEEN_UPDATES:
             return
         self._shown = now
-        left = (now - begun) * (total - done) / done if done else 0
+        left = pace.left(now, done, total)
         ending = f", {left:.0f} s left" if left else ""
         self._show(f"{what}: {done:.4g} of {total:g} {note}".rstrip() + ending)
 

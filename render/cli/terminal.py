@@ -26,7 +26,7 @@ from rich.progress import Progress as Bar
 
 from onespp.api.caller import Caller, calling
 from onespp.render.errors import InputError, readable
-from onespp.render.progress import Progress
+from onespp.render.progress import Pace, Progress
 
 SECONDS_BETWEEN_LINES = 5.0
 BAD_INPUT, INTERRUPTED = 2, 130
@@ -55,7 +55,7 @@ class Steps:
 
     def __init__(self, title: str, total: float, bar: Bar | None) -> None:
         self.title, self.total, self._bar = title, total, bar
-        self._started: float | None = None
+        self._pace: Pace | None = None
         self._shown = time.monotonic()
         self._finished = False
         self._task = bar.add_task(title, total=total, start=False) if bar else None
@@ -65,16 +65,16 @@ class Steps:
         if _Stop.asked:
             raise KeyboardInterrupt
         if self._bar is not None and self._task is not None:
-            if self._started is None:
+            if self._pace is None:
                 self._bar.start_task(self._task)
             self._bar.update(self._task, completed=done, description=f"{self.title} {note}".strip())
         now = time.monotonic()
-        self._started = self._started or now
+        self._pace = self._pace or Pace(now, done)
         last = done >= self.total and not self._finished
         self._finished = done >= self.total
         if self._bar is None and (last or now - self._shown >= SECONDS_BETWEEN_LINES):
             self._shown = now
-            left = (now - self._started) * (self.total - done) / done if done else 0
+            left = self._pace.left(now, done, self.total)
             ending = "" if last or not left else f", {left:.0f} s left"
             text = f"{self.title}: {done:.4g} of {self.total:g} {note}".rstrip()
             click.echo(text + ending, err=True)

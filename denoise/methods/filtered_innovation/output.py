@@ -59,9 +59,9 @@ def output_level(layout: SignalLayout, level: int, values: Taps[list[NoisySignal
         taps, surface_x = values.at(i), exponent(i, offset)
         for s, tap in zip(left, taps, strict=True):
             c = center[s]
-            noise = rules[s].noise(c.variance, tap.variance)
+            precision = 1 / (rules[s].noise(c.variance, tap.variance) + EPSILON**2)
             distance = (tap.signal.luminance - c.signal.luminance) * sigmas[s]
-            x = rules[s].nearer(surface_x - dr.square(distance) * (1 / (noise + EPSILON**2)), offset)
+            x = rules[s].nearer(surface_x - dr.square(distance) * precision, offset)
             fade = rules[s].fade
             w = exp2(x if fade is None else x + fade)
             samples = sums[s].samples
