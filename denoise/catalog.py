@@ -30,6 +30,7 @@ from onespp.denoise.methods.atrous import Atrous
 from onespp.denoise.methods.bilateral import Bilateral
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
 from onespp.denoise.methods.learned.rae import Rae
+from onespp.denoise.methods.learned.unet import Unet
 from onespp.denoise.methods.outliers import RemoveOutliers, WithoutOutliers
 from onespp.denoise.methods.parameters import renamed_parameters, with_present_names
 from onespp.denoise.methods.regression.bmfr import Bmfr
@@ -98,6 +99,7 @@ METHODS: Mapping[str, type] = MappingProxyType({
     "asvgf": Asvgf,
     "bmfr": Bmfr,
     "rae-quarter": Rae,
+    "unet-half": Unet,
     "onespp": FilteredInnovation,
     "onespp-taa": InnovationTaa,
 })

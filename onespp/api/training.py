@@ -37,7 +37,7 @@ class Trained:
 def train_network(network: str, folder: Path | str | None, out: Path | str, *, steps: int = 2000,
                   width: str | None = None, seed: int = 0, batch: int = 4, crop: int = 128,
                   checkpoint: int = 100, cache: Path | str | None = None,
-                  sequences: int = 100) -> Trained:
+                  sequences: int = 100, result: str = "") -> Trained:
     """Train a network, such as `rae` for `onespp denoise --method rae-quarter --set weights=FILE`.
 
     The same call goes on where it was stopped, to the same weights. More `steps` go on as well.
@@ -53,6 +53,8 @@ def train_network(network: str, folder: Path | str | None, out: Path | str, *, s
         crop: their side, pixels. checkpoint: steps between checkpoints.
         cache: a folder for memory maps of frames, which are read quicker.
         sequences: of a data set that is drawn.
+        result: name of what `onespp denoise` has made of all sequences of the data set, which the
+            network gets in the place of the noisy frames.
 
     Raises:
         InputError: there is no such network, JAX or Optax are missing, the data set is of scenes
@@ -63,10 +65,12 @@ def train_network(network: str, folder: Path | str | None, out: Path | str, *, s
     from onespp.training.curve import draw_curve
 
     out, width = Path(out), width or architecture_of(network).width
-    settings = Settings(network, width, seed, batch, crop)
+    settings = Settings(network, width, seed, batch, crop, result)
     require_jax()
     if out.suffix != ".npz":
         raise InputError(f"--out is {out}: give a file that ends with .npz")
+    if folder is None and result:
+        raise InputError(f"--result is '{result}', of a data set that is there: give its folder")
     if folder is None:
         folder = out.with_suffix(".data")
         dataset("rooms", folder, sequences=sequences, frames=_FRAMES, size=(crop, crop),

@@ -9,7 +9,6 @@ import click
 
 from onespp.denoise.methods.learned.architecture import WIDTHS, Architecture
 from onespp.denoise.methods.learned.networks import NETWORKS
-from onespp.denoise.methods.learned.weights import shipped
 
 
 @click.group()
@@ -18,14 +17,11 @@ def train() -> None:
 
 
 def _command(kind: Architecture) -> click.Command:
-    method = f"{kind.name}-{kind.width}"
-    use = (f" Use the result by `onespp denoise --method {method} --set weights=FILE`."
-           if shipped(kind.name).exists() else "")  # without weights there is no such method
-
     @click.command(kind.name, help=f"""Train {kind.about} on the data set in DIR.
 
     Without DIR one is drawn beside FILE first, by the plan `rooms`. The same command goes on where
-    it was stopped, to the same weights, and with more --steps further.{use}
+    it was stopped, to the same weights, and with more --steps further. Use the result by `onespp
+    denoise --method {kind.name}-{kind.width} --set weights=FILE`.
     """)
     @click.argument("folder", required=False, type=click.Path(path_type=Path), metavar="[DIR]")
     @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="FILE",
@@ -47,6 +43,9 @@ def _command(kind: Architecture) -> click.Command:
                   help="Keep decoded frames there, which are read quicker.")
     @click.option("--sequences", type=int, default=100, show_default=True, metavar="N",
                   help="Of the data set that is drawn where no DIR is given.")
+    @click.option("--result", default="", metavar="NAME",
+                  help="Train on what `onespp denoise` has made of all sequences in DIR under this "
+                  "name, in the place of their noisy frames.")
     def run(folder: Path | None, out: Path, **options: Any) -> None:
         from onespp.api.training import train_network
 

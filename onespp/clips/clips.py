@@ -19,9 +19,10 @@ from onespp.datasets.folder import DataSet
 from onespp.datasets.plan import SPLITS, Plan
 from onespp.render.channels import CHANNELS, REPLAY, Group, channels_of
 from onespp.render.errors import InputError
+from onespp.render.files.sequence import FrameSequence
 
 from .motion import Matrices, motion_in_pixels
-from .store import HALF, REFERENCE, Store
+from .store import HALF, REFERENCE, RESULT, Store
 from .view import Turn, seen_through
 
 MOTION = "motion"
@@ -56,7 +57,8 @@ class Clips:
         folder: of the data set, finished or not: sequences that are whole now.
         frames: of a clip. crop: pixels a side, (height, width), or None for whole frames; it
             follows the mean motion of what it shows.
-        channels: of the channel table, those that follow from others too, and `motion`.
+        channels: of the channel table, those that follow from others too, and `motion`;
+            `denoised/NAME` is the result of that name, which `onespp denoise` has made.
         split: "train", "validation" or "test".
         seed, epoch: of all that is random; see `set_epoch`.
         augment: random sequence starts, renders, crops, flips, quarter turns (of square crops), and
@@ -104,6 +106,9 @@ class Clips:
         self._objects = max(len(sequence.manifest.objects) for sequence in sequences)
         self._has_reference = bool(self.plan.reference_spp or self.plan.reference_error)
         self._check_channels(data, set.intersection(*({*s.channels} for s in sequences)))
+        for name in self.channels:
+            if name.startswith(RESULT):
+                self._check_results(data, name.removeprefix(RESULT))
 
     def __len__(self) -> int:
         return len(self.numbers) * self._in_sequence
@@ -145,11 +150,21 @@ class Clips:
         """InputError where `there`, the channels that all sequences have, are too few."""
         needed = {*self.channels, "depth", "id"} - {MOTION}
         for name in (*self.channels, *sorted(needed)):
-            if name not in there and name != MOTION:
+            if name not in there and name != MOTION and not name.startswith(RESULT):
                 raise InputError(f"{data.folder} lacks the channel '{name}' in some sequence (all "
                                  f"have {', '.join(c for c in CHANNELS if c in there)})")
         if self.halves and not self._has_reference:
             raise InputError(f"{data.folder} has no references, so no halves of them")
+
+    def _check_results(self, data: DataSet, name: str) -> None:
+        """InputError where a sequence lacks a result of a frame."""
+        for number in self.numbers:
+            for k in range(self.plan.seeds):
+                sequence = FrameSequence.open(data.place(number) / f"seed{k}")
+                if not all(sequence.has_result(name, i) for i in sequence.frames):
+                    raise InputError(f"{sequence.folder} has no result '{name}' of all frames: run "
+                                     f"`onespp denoise {sequence.folder} --name {name}` with a "
+                                     "method, and so for all sequences")
 
     def _cut(self, number: int, first: int, renders: list[int],
              random: np.random.Generator) -> _Clip:
@@ -208,7 +223,7 @@ class Clips:
                 array = turn.vectors(name, array.astype(np.float32), world)
             if name in REPLAY:  # -1 says that there is no sample
                 array = np.where(array < 0, array, array * np.float32(brighter))
-            elif name in (*_LIGHT, REFERENCE, HALF):
+            elif name in (*_LIGHT, REFERENCE, HALF) or name.startswith(RESULT):
                 array = array * np.float32(brighter)
             return np.ascontiguousarray(array)
 

@@ -2,7 +2,8 @@
 
 In the cache there is an .npy file for each channel of each render, all frames in one, in the type
 that the sequence stores. It is named after the hash of the sequence's files: of one that was made
-anew nothing old is read.
+anew nothing old is read. Results of methods, which may be made anew while the frames stay, are
+decoded each time.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from onespp.render.files.sequence import FrameSequence
 from .motion import Matrices
 
 REFERENCE, HALF = "reference", "reference-half"
+RESULT = "denoised/"  # and its name: what a method has made of the frames
 _MOST_OPEN = 4096
 MATRICES = ("camera_from_world", "screen_from_world", "world_from_object")
 
@@ -42,11 +44,17 @@ class Store:
     def images(self, number: int, k: int, i: int, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Channels of frame i of the k-th render of a sequence, (h, w) or (h, w, c), whole.
 
-        `REFERENCE` is the reference, `HALF` its first half minus itself.
+        `REFERENCE` is the reference, `HALF` its first half minus itself, `RESULT` and a name what
+        `onespp denoise` has made.
         """
+        sequence = _sequence(self.data, number, k)
+        found = {name: sequence.read_result(name.removeprefix(RESULT), i) for name in names
+                 if name.startswith(RESULT)}
+        names = [name for name in names if name not in found]
         if self.cache is not None:
-            return {name: array[i] for name, array in self._mapped(number, k, names).items()}
-        return _decoded(_sequence(self.data, number, k), i, names)
+            return {**found, **{name: array[i] for name, array in self._mapped(
+                number, k, names).items()}}
+        return {**found, **_decoded(sequence, i, names)}
 
     def matrices(self, number: int, i: int) -> Matrices:
         """Of frame i."""

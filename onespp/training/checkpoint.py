@@ -53,8 +53,8 @@ class Checkpoint:
             with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as file:
                 about = json.loads(file["about"].tobytes())
                 arrays = {name[6:]: file[name] for name in file.files if name.startswith("array/")}
-                # (before there were other networks, none was named)
-                found = Checkpoint({"network": "rae", **about["settings"]}, arrays,
+                # (before there were other networks and inputs, none was named)
+                found = Checkpoint({"network": "rae", "result": "", **about["settings"]}, arrays,
                                    file["losses"].tolist(),
                                    {int(k): v for k, v in about["validation"].items()},
                                    about["seconds"])

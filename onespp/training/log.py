@@ -36,6 +36,7 @@ class Log(JsonFile):
     seed: int
     batch: int
     crop: int
+    result: str = ""
     steps: int
     data: Data
     versions: dict[str, str]
@@ -45,7 +46,7 @@ class Log(JsonFile):
 
     @property
     def name(self) -> str:
-        return f"{self.network}-{self.width}"
+        return f"{self.network}-{self.width}" + (f" on {self.result}" if self.result else "")
 
 
 @dataclass(frozen=True)

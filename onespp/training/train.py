@@ -30,6 +30,7 @@ from typing import Any
 
 import numpy as np
 
+from onespp.datasets.folder import DataSet
 from onespp.denoise.methods.learned.architecture import WIDTHS, Architecture, Weights
 from onespp.denoise.methods.learned.networks import architecture_of
 from onespp.denoise.methods.learned.weights import Network, write_network
@@ -55,7 +56,8 @@ class Settings:
 
     Attributes:
         network: of `NETWORKS`. width: of `WIDTHS`. seed: of the first weights and all batches.
-        batch: clips a step. crop: side of a clip, pixels.
+        batch: clips a step. crop: side of a clip, pixels. result: in the place of the noisy frames,
+            as `Batches.of` has it.
     """
 
     network: str = "rae"
@@ -63,6 +65,7 @@ class Settings:
     seed: int = 0
     batch: int = 4
     crop: int = 128
+    result: str = ""
 
     def __post_init__(self) -> None:
         architecture_of(self.network)
@@ -114,7 +117,8 @@ def train(folder: Path, out: Path, steps: int, settings: Settings, every: int = 
     for name, value in (("--steps", steps), ("--checkpoint", every)):
         if value < 1:
             raise InputError(f"{name} is {value}: use 1 or more")
-    batches = Batches.of(folder, settings.crop, settings.batch, settings.seed, cache)
+    batches = Batches.of(folder, settings.crop, settings.batch, settings.seed, cache,
+                         result=settings.result)
     others = _validation(folder, settings, cache)
     known = {**asdict(settings), "data": batches.digest, "rules": RULES}
     path = checkpoint_of(out)
@@ -184,12 +188,11 @@ def _write(out: Path, stand: Checkpoint, weights: Weights, settings: Settings,
 def _validation(folder: Path, settings: Settings,
                 cache: Path | None) -> tuple[np.ndarray, np.ndarray] | None:
     """A batch of scenes that are not trained on; None where the data set has none."""
-    try:
-        batches = Batches.of(folder, settings.crop, settings.batch, VALIDATION_SEED, cache,
-                             "validation", augment=False)
-    except InputError:
+    split = "validation"
+    if not DataSet.open(folder).numbers(split):
         return None
-    return batches.read(0)
+    return Batches.of(folder, settings.crop, settings.batch, VALIDATION_SEED, cache, split,
+                      augment=False, result=settings.result).read(0)
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import shutil
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
@@ -16,6 +17,7 @@ from onespp.clips import store
 from onespp.clips.motion import Matrices
 from onespp.clips.view import Turn
 from onespp.denoise.geometry.correspondence import NOWHERE, carry, previous_pixel
+from onespp.render.files.sequence import FrameSequence
 from tests.support.clip_digests import digest, digests
 from tests.support.frames import make_frame, translation
 
@@ -163,6 +165,23 @@ def test_a_cache_gives_the_same_clips_without_decoding(monkeypatch, made, tmp_pa
 
     monkeypatch.setattr(store, "_decoded", decoded)
     assert digest(cached[0]) == plain
+
+
+def test_what_methods_made_is_read_as_the_noisy_frames_are(made, tmp_path):
+    """Cut, turned and made brighter like them; anew, though there is a cache."""
+    folder = tmp_path / "set"
+    shutil.copytree(made.folder, folder)
+    options = {"frames": 3, "crop": 12, "channels": ("color", "denoised/half"),
+               "cache": tmp_path / "cache"}
+    with pytest.raises(InputError, match="seed0 has no result 'half' of all frames: run"):
+        Clips(folder, **options)
+    for factor in (0.5, 0.25):
+        for path in folder.glob("train/*/seed*"):
+            sequence = FrameSequence.open(path)
+            for i in sequence.frames:
+                sequence.write_result("half", i, factor * sequence.read_frame(i)["color"])
+        clip = Clips(folder, **options)[0]
+        np.testing.assert_allclose(clip["denoised/half"], factor * clip["color"], rtol=1e-6)
 
 
 def test_readers_load_no_renderer(made):

@@ -18,7 +18,8 @@ STILL = make_frame(HEIGHT, WIDTH, wall_end=1e9)
 PLAIN = {"demodulate": "false", "radius": "3", "levels": "2", "output_levels": "2",
          "sharp_output_levels": "2"}
 
-LEARNED = {"rae-quarter"}  # a network's weights do not add up to one: it keeps no mean exactly
+# A network's weights do not add up to one: it keeps no mean exactly.
+LEARNED = {"rae-quarter", "unet-half"}
 
 # Settings that leave accumulation alone: nothing is clamped, and no pixel is like another.
 ALONE = {"color_box": "1e6", "sigma_color": "1e-12", "sigma_luminance": "1e-12"}

@@ -16,6 +16,7 @@ import onespp
 from onespp.datasets.folder import DataSet
 from onespp.denoise.methods.learned.weights import read_network
 from onespp.render.errors import InputError
+from onespp.render.files.sequence import FrameSequence
 from onespp.training import train as training
 from onespp.training.batches import KEPT, Batches
 from onespp.training.checkpoint import Checkpoint
@@ -69,7 +70,7 @@ def test_what_cannot_be_trained_on_is_refused(made, tmp_path, monkeypatch):
 def test_a_checkpoint_of_another_training_or_a_damaged_one_is_refused(tmp_path):
     path = tmp_path / "x.checkpoint.npz"
     Checkpoint({"seed": 1}, {"a": np.ones(3)}, [0.5, 0.25], {2: 0.3}, 9.0).write(path)
-    again = Checkpoint.read(path, {"network": "rae", "seed": 1})  # those of before name none
+    again = Checkpoint.read(path, {"network": "rae", "result": "", "seed": 1})  # (older: none)
     assert (again.losses, again.validation, again.seconds) == ([0.5, 0.25], {2: 0.3}, 9.0)
     with pytest.raises(InputError, match=r"seed is 1 there, 2 here\): use another --out"):
         Checkpoint.read(path, {"seed": 2})
@@ -138,6 +139,22 @@ def test_a_batch_follows_from_seed_and_step(data):
     for a, b in zip((planes, truth), again):
         np.testing.assert_array_equal(a, b)
     assert not np.array_equal(planes, Batches.of(data.folder, 32, 2, 6).read(3)[0])
+
+
+@pytest.mark.slow
+def test_what_a_method_made_stands_in_the_place_of_noisy_frames(data, tmp_path):
+    folder = tmp_path / "set"
+    shutil.copytree(data.folder, folder)
+    for path in folder.glob("*/*/seed*"):
+        sequence = FrameSequence.open(path)
+        for i in sequence.frames:
+            sequence.write_result("darker", i, sequence.read_frame(i)["color"] / 4)
+    (planes, truth), noisy = (Batches.of(folder, 32, 2, 5, result=name).read(3)
+                              for name in ("darker", ""))
+    np.testing.assert_array_equal(planes[..., 3:], noisy[0][..., 3:])
+    assert (planes[..., :3] <= noisy[0][..., :3]).all()
+    assert planes[..., :3].mean() < 0.8 * noisy[0][..., :3].mean()
+    np.testing.assert_array_equal(truth, noisy[1])
 
 
 @pytest.mark.slow

@@ -118,7 +118,7 @@ def test_frames_alike_record_once_and_other_weights_compile_nothing(kind, files,
     assert compiled(lambda: run(METHODS[kind](str(other)), frames)) == 0
 
 
-@pytest.mark.parametrize("kind", ["rae"])
+@each_kind
 def test_shipped_weights_are_small_and_say_what_they_are(kind):
     network = read_network(shipped(kind))
     assert network.width == NETWORKS[kind].width

@@ -20,7 +20,7 @@ SMALL = {"gaussian": {"radius": "4"}, "gaussian-separable": {"radius": "4"},
          "assignment-atrous": {"levels": "3"}, "temporal": {}, "svgf": {"levels": "3"},
          "asvgf": {"levels": "3"}, "trmv": {"levels": "3"},
          "bmfr": {"block_size": "8"},
-         "rae-quarter": {},
+         "rae-quarter": {}, "unet-half": {},
          "taa": {},
          "onespp": {"innovation_levels": "3", "output_levels": "3", "sharp_output_levels": "2"}}
 SMALL["onespp-taa"] = SMALL["onespp"]
@@ -29,12 +29,12 @@ SMALL["onespp-taa"] = SMALL["onespp"]
 # a fit whose features tell objects apart only as far as a sum of them can, and a network, however
 # well it is trained: nothing in it compares IDs.
 # Anti-aliasing is to make a pixel of an edge the mean of both sides.
-LEAKING = {"gaussian", "gaussian-separable", "bilateral-color", "bmfr", "rae-quarter", "taa",
-           "onespp-taa"}
+LEAKING = {"gaussian", "gaussian-separable", "bilateral-color", "bmfr", "rae-quarter", "unet-half",
+           "taa", "onespp-taa"}
 
 # A network's weights do not add up to one, so that it keeps what is already clean only as far as it
 # has learned to. What else holds of it, the window's extremes see to.
-LEARNED = {"rae-quarter"}
+LEARNED = {"rae-quarter", "unet-half"}
 
 each_method = pytest.mark.parametrize("name", METHODS)
 SIZES = [(1, 1), (1, 7), (7, 1), (3, 5), (13, 17), (23, 2)]
