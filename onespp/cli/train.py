@@ -59,11 +59,18 @@ def _command(kind: Architecture) -> click.Command:
 
 @train.command()
 @click.argument("logs", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
-def losses(logs: tuple[Path, ...]) -> None:
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE",
+              help="Also draw their losses into FILE (.png).")
+def losses(logs: tuple[Path, ...], plot: Path | None) -> None:
     """Compare trainings by their logs (.json), and print the spread over seeds."""
     from onespp.training.log import read_logs, table
 
-    click.echo(table(read_logs(logs)))
+    read = read_logs(logs)
+    click.echo(table(read))
+    if plot is not None:
+        from onespp.training.curve import draw_curves
+
+        draw_curves(read, plot)
 
 
 for _kind in NETWORKS.values():

@@ -11,6 +11,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import onespp
 from onespp.datasets.folder import DataSet
@@ -100,6 +101,22 @@ def test_losses_of_seeds_are_told_with_their_spread(tmp_path):
                         (log("none", 0, {}), "none has no losses on other scenes")):
         with pytest.raises(InputError, match=words):
             read_logs([paths[0], path])
+
+
+def test_the_command_compares_losses_and_draws_them(call, tmp_path):
+    logs = [tmp_path / f"{seed}.json" for seed in range(2)]
+    for seed, path in enumerate(logs):
+        path.write_text(json.dumps({
+            "width": "half", "seed": seed, "batch": 4, "crop": 128, "steps": 3,
+            "data": {"name": "rooms", "seed": 1, "digest": "a", "sequences": 9}, "versions": {},
+            "seconds": 1.0, "loss": [0.5, 0.3, 0.1], "validation": {"3": 0.1 + seed}}))
+    picture = tmp_path / "losses.png"
+    code, out, _ = call("train", "losses", *map(str, logs), "--plot", str(picture))
+    assert code == 0
+    assert "rae-half: 0.6000 +- 0.7071 on others at step 3, 2 seeds" in out
+    with Image.open(picture) as image:  # a colour for each, on white
+        assert {(31, 119, 180), (255, 127, 14)} <= {color[:3] for _, color in
+                                                   image.getcolors(1 << 24)}
 
 
 def test_the_rate_grows_tenfold_and_falls_as_the_root():
