@@ -29,6 +29,7 @@ import from_code
 import numpy as np
 
 import onespp  # noqa: F401 - finds LLVM before anything imports Dr.Jit
+from onespp.api.studies import plain_copy
 from onespp.denoise.catalog import METHODS, PEERS, Method, build, parameters
 from onespp.denoise.metrics.tonemap import TONE_MAP
 from onespp.denoise.report.speed_error_plot import plot_speed_against_error
@@ -38,6 +39,7 @@ from onespp.denoise.score.method_score import INPUT, MethodScore
 from onespp.denoise.score.scorecard import Scores
 from onespp.denoise.score.sequence import score
 from onespp.denoise.studies import hard_scenes as hard_study
+from onespp.denoise.studies import suite as suite_study
 from onespp.denoise.studies.ablation import ablate, variants
 from onespp.denoise.studies.ablation import markdown as ablation_table
 from onespp.denoise.studies.lead import BEST as BEST_FORM
@@ -153,6 +155,24 @@ class Plan:
     def hard_scores(self) -> dict[str, Scores]:
         """Name -> scores of all methods on the hard scenes."""
         return {name: self.scored_by_all(self.hard_sequence(name)) for name in self.hard}
+
+    @cached_property
+    def suite(self) -> dict[suite_study.Group, dict[str, Scores]]:
+        """Scores of what `onespp lead --suite` asks for, on the sequences that are here anyway."""
+        def case(scene: str, plain: bool) -> Scores:
+            name = scene.removeprefix("hard/")
+            if not plain:
+                return {**self.ours, **self.light, **self.hard_scores}[name]
+            original = FrameSequence.open(self.data / scene)
+            say(f"{scene}: as plain frames")
+            sequence = plain_copy(original, self.data / "plain" / scene)
+            denoise(sequence, {m: method for m, method in all_methods(sequence).items()
+                               if m in (BEST, *suite_study.PLAIN_PEERS)}, self.again)
+            return scores_of(sequence)
+
+        hard = tuple(f"hard/{name}" for name in self.hard)
+        return {group: {scene: case(scene, group.plain) for scene in group.scenes}
+                for group in suite_study.groups([*self.light], hard)}
 
     @cached_property
     def worst(self) -> dict[str, failures.Failure]:
@@ -396,6 +416,12 @@ def light(plan: Plan) -> str:
             f"{_light_conditions(plan)}.{mean}")
 
 
+def targets(plan: Plan) -> str:
+    return (f"{suite_study.markdown(BEST, plan.suite)}\n\nPSNR in dB on {TONE_MAP}, mean over "
+            f"frames; {'; '.join(map(conditions, plan.ours.values()))}; generated scenes: "
+            f"{_light_conditions(plan)}; hard: {_hard_conditions(plan)}")
+
+
 def _light_conditions(plan: Plan) -> str:
     return (f"frames {LIGHT_FRAMES} at {LIGHT_SIZE}, references {plan.others_spp} spp in halves, "
             "seed 5")
@@ -487,6 +513,7 @@ PARTS: dict[str, tuple[Path, Callable[[Plan], str]]] = {
     "lead": (ROOT / "docs/results.md", lead),
     "others": (ROOT / "docs/results.md", others),
     "light": (ROOT / "docs/results.md", light),
+    "targets": (ROOT / "docs/results.md", targets),
     "ablation": (ROOT / "docs/results.md", ablation),
     "hard-onespp": (ROOT / "docs/results.md", hard_of_best),
     "hard": (ROOT / "docs/results.md", hard),
@@ -515,7 +542,8 @@ def own_command(name: str, plan: Plan) -> str:
     hard = f"--hard-spp {plan.hard_spp}" + "".join(
         f" --hard {scene}" for scene in plan.hard if plan.hard != tuple(HARD))
     given = {"others": others, "light": others, "hard-onespp": hard, "hard": hard,
-             "failures": hard, "methods": f"{two} {others} {hard}"}.get(name, two)
+             "failures": hard, **dict.fromkeys(("methods", "targets"),
+                                               f"{two} {others} {hard}")}.get(name, two)
     return f"python docs/results.py --parts {name} {given}"
 
 

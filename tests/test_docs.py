@@ -38,6 +38,7 @@ from onespp.denoise.metrics.tonemap import srgb_from_linear
 from onespp.denoise.score.method_score import INPUT, MethodScore
 from onespp.denoise.score.scorecard import Scores
 from onespp.denoise.score.sequence import score
+from onespp.denoise.studies.lead import OIDN_FORMS
 from onespp.render.errors import InputError
 from onespp.user_code import is_file
 from tests.support.frames import make_frame, noisy
@@ -312,7 +313,9 @@ def check_command(words: list[str]) -> None:
         program, *rest = rest[1:]
         if (ROOT / program.replace(".", "/")).with_suffix(".py").is_file():
             return
-    if program == "onespp" and rest:
+    if program == "find" and "-exec" in rest:
+        check_command(rest[rest.index("-exec") + 1:-1])
+    elif program == "onespp" and rest:
         command, rest = find(rest)
         parse(command, rest)
         if command.name != "dataset":  # those are of a plan
@@ -515,6 +518,29 @@ def test_the_table_of_all_methods_says_source_worth_and_failure(measured):
                                        "3105762.3105770) | 32.00 |")
     assert rows["| `svgf`"].endswith("| `cut`, frame 1 |")
     assert "3 scenes, `generated/12` to `generated/22`" in results.methods(measured)
+
+
+def test_targets_are_judged_on_the_sequences_of_the_other_tables(measured, scores, monkeypatch):
+    def ahead(by):
+        return with_decibels(scores, {**{form: [30, 30] for form in OIDN_FORMS},
+                                      "onespp": [30 + by, 30 + by]})
+
+    made = {"ours": {"box": ahead(3), "room": ahead(1)}, "light": {"generated/12": ahead(2)},
+            "hard_scores": {"cut": ahead(4)}}
+    measured.__dict__.update(made)
+    monkeypatch.setattr(results, "plain_copy", lambda sequence, folder: (sequence, folder))
+    monkeypatch.setattr(results.FrameSequence, "open", lambda folder: folder)
+    monkeypatch.setattr(results, "all_methods", lambda _: {})
+    monkeypatch.setattr(results, "scores_of", lambda copied: ahead(5) if copied == (
+        measured.data / copied[0].relative_to(measured.data),
+        measured.data / "plain" / copied[0].relative_to(measured.data)) else None)
+    said = results.targets(measured)
+    for row in ("| box: least lead | +2.5 dB | +3.00 dB | held |",
+                "| room: least lead | +2.0 dB | +1.00 dB | **missed** |",
+                "| kept scenes: mean lead | +2.0 dB | +2.00 dB | held |",
+                "| hard scenes: least lead | +0.0 dB | +4.00 dB | held |",
+                "| plain frames: least lead | +1.0 dB | +5.00 dB (`box`) | held |"):
+        assert row in said
 
 
 def test_every_method_names_its_source_or_is_ours():
