@@ -37,6 +37,7 @@ class Group(Enum):
     SHADOW = "the shadow ray at the first hit"
     GROUPED = "direct light by groups of lights, of scenes that have several"
     GLOSS = "reflections, of scenes that have glossy surfaces"
+    LAYER = "what else is seen, of scenes that have glass or masks"
     REPLAY = "samples of the last frame, shaded again"
     MOTION = "of imports alone, whose motion no matrices tell"
     TRUTH = "of references alone"
@@ -151,6 +152,21 @@ _ROWS = (
             "object ID of what the path met next; -1: nothing"),
     Channel("roughness", Group.GLOSS, ("roughness",), HALF, Display.UNIT, 1.0,
             "GGX alpha of the surface's glossy lobe; 0: a mirror or a hole, 1: no such lobe"),
+    Channel("layer_share", Group.LAYER, ("layer.A",), FLOAT, Display.UNIT, 0.0,
+            "share that the brightest other layer has in what glass or a mask shows, by what of its "
+            "light gets here; 0: there is none"),
+    Channel("layer_albedo", Group.LAYER, _rgb("layer.albedo"), HALF, Display.LIGHT, 0.0,
+            "`albedo` of that layer's surface, less what takes of its light on the way"),
+    Channel("layer_normal", Group.LAYER, ("layer.N.X", "layer.N.Y", "layer.N.Z"), FLOAT,
+            Display.AXES, 0.0, "its `normal`, of the image"),
+    Channel("layer_depth", Group.LAYER, ("layer.Z",), EXACT, Display.RANGE, 0.0,
+            "its `depth`, of the image; 0: none, or nothing there"),
+    Channel("layer_id", Group.LAYER, ("layer.ID",), OBJECT_ID, Display.OBJECT, -1.0,
+            "its `id`, of the image; -1: none, or nothing there"),
+    Channel("layer_lamps", Group.LAYER, _rgb("layer.lamps"), FLOAT, Display.LIGHT, 0.0,
+            "radiance of the lamps and the environment that other layers show, noise-free"),
+    Channel("layer_sample", Group.LAYER, _rgb("layer.sample"), FLOAT, Display.LIGHT, 0.0,
+            "the noisy part of `specular` that has the mean `layer_lamps`"),
     Channel("replay", Group.REPLAY, ("replay.direct", "replay.indirect"), FLOAT, Display.UNIT, -1.0,
             "luminance of some samples of the frame one number before (in the sequence or not), "
             "shaded again here; -1: no sample"),
@@ -185,15 +201,17 @@ def channels_of(*groups: Group) -> tuple[str, ...]:
     return tuple(row.name for group in groups for row in _ROWS if row.group is group)
 
 
-RADIANCE, SPLIT, SHADOW, GROUPED, GLOSS, REPLAY = (channels_of(group) for group in (
-    Group.RADIANCE, Group.SPLIT, Group.SHADOW, Group.GROUPED, Group.GLOSS, Group.REPLAY))
+RADIANCE, SPLIT, SHADOW, GROUPED, GLOSS, LAYER, REPLAY = (channels_of(group) for group in (
+    Group.RADIANCE, Group.SPLIT, Group.SHADOW, Group.GROUPED, Group.GLOSS, Group.LAYER,
+    Group.REPLAY))
 UNSHADOWED = tuple(name for name in GROUPED if name.startswith("unshadowed"))
 FRAME = channels_of(Group.RADIANCE, Group.GUIDES)
 """What can be said of every scene."""
 OFFERED = channels_of(*(group for group in Group if group not in (Group.TRUTH, Group.MOTION)))
 """What a rendered frame can carry."""
 TRAINING = tuple(name for name in OFFERED if name not in (
-    "color", "position", "hit_distance", "hit_id", *REPLAY))
+    "color", "position", "hit_distance", "hit_id", *REPLAY,
+    *(name for name in LAYER if name not in ("layer_lamps", "layer_sample"))))
 """What training and methods read, but for what `asvgf` and `trmv` alone do, without what follows
 from it (`render/derived.py`)."""
 REFERENCE = ("color", "half", "quarter0", "quarter1")

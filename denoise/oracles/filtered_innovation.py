@@ -35,6 +35,9 @@ def unshadowed_of(frame: Frame) -> dict[str, np.ndarray]:
 def signals_of(frame: Frame) -> dict[str, np.ndarray]:
     """L, G and V, (h, w, c), then y of each group."""
     light = frame["direct"].astype(float) + frame["indirect"] - frame["specular"]
+    specular = frame["specular"].astype(float)
+    if "layer_sample" in frame:
+        specular = specular - frame["layer_sample"]
     unshadowed = unshadowed_of(frame)
     told, chance = {"V": np.minimum(frame["visibility"].astype(float), 2)[..., None]}, 1.0
     if "group" in frame:
@@ -49,7 +52,7 @@ def signals_of(frame: Frame) -> dict[str, np.ndarray]:
         bare = (texture_of(frame) >= 1).all(-1) & (roughness_of(frame) < 1)
         mirrored = np.where(bare[..., None], light, 0)
     return {"L": (light - mirrored) / texture_of(frame),
-            "G": frame["specular"] + mirrored, **told}
+            "G": specular + mirrored, **told}
 
 
 def roughness_of(frame: Frame) -> np.ndarray:
@@ -77,7 +80,8 @@ def turn_of(previous: Frame, frame: Frame) -> np.ndarray:
 
 def color_of(frame: Frame, signals: dict[str, np.ndarray]) -> np.ndarray:
     direct = sum(signals[name] * u for name, u in unshadowed_of(frame).items())
-    return frame["emission"] + direct + texture_of(frame) * signals["L"] + signals["G"]
+    lamps = frame["layer_lamps"] if "layer_lamps" in frame else 0
+    return frame["emission"] + lamps + direct + texture_of(frame) * signals["L"] + signals["G"]
 
 
 def kind_of(frame: Frame) -> np.ndarray:

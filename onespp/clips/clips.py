@@ -17,7 +17,7 @@ import numpy as np
 
 from onespp.datasets.folder import DataSet
 from onespp.datasets.plan import SPLITS, Plan
-from onespp.render.channels import CHANNELS, REPLAY, Group, channels_of
+from onespp.render.channels import CHANNELS, LAYER, REPLAY, Group, channels_of
 from onespp.render.errors import InputError
 
 from .motion import Matrices, motion_in_pixels
@@ -25,9 +25,10 @@ from .store import HALF, REFERENCE, Store
 from .view import Turn, seen_through
 
 MOTION = "motion"
-_LIGHT = (*channels_of(Group.RADIANCE), "specular",
+_LIGHT = (*channels_of(Group.RADIANCE), "specular", "layer_lamps", "layer_sample",
           *(name for name in CHANNELS if name.startswith("unshadowed")))
-_WITHOUT_NOISE = (*channels_of(Group.GUIDES), "roughness", MOTION)
+_WITHOUT_NOISE = (*channels_of(Group.GUIDES), "roughness", MOTION,
+                  *(name for name in LAYER if name != "layer_sample"))
 _EVERY = 4  # pixels by which the mean motion of a crop is found
 
 

@@ -13,6 +13,7 @@ from onespp.render.channels import (
     FRAME,
     GLOSS,
     GROUPED,
+    LAYER,
     RADIANCE,
     REPLAY,
     SHADOW,
@@ -34,7 +35,7 @@ from .replay import replay
 from .sampler import FRAME_STREAM, REFERENCE_STREAM, Sampler, Sobol, keys_from_seed
 from .view import View
 
-_TRACED = {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS}
+_TRACED = {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS, "layer_sample"}
 """Channels that take more than the first hit."""
 
 
@@ -45,7 +46,8 @@ class Renderer(View):
     def channels(self) -> tuple[str, ...]:
         """All channels of its frames that are not the same in any scene of this kind."""
         return (FRAME + (SPLIT + SHADOW if self.splits else ()) + self._grouped
-                + (GLOSS if self.stage.glossy else ()))
+                + (GLOSS if self.stage.glossy else ())
+                + (LAYER if self.stage.images.layered else ()))
 
     @property
     def _grouped(self) -> tuple[str, ...]:
@@ -67,6 +69,10 @@ class Renderer(View):
         if lacking := [c for c in channels if c in GROUPED and c not in self._grouped]:
             raise InputError(f"the channels {', '.join(lacking)} need --direct resampled and a "
                              f"scene of more lights than '{self.scene.name}' has")
+        if set(channels) & {*LAYER} and not self.stage.images.layered:
+            raise InputError(f"the channels {', '.join(c for c in LAYER if c in channels)} need a "
+                             "scene with clear glass or masks, which "
+                             f"'{self.scene.name}' is not: leave them out")
         before = index - 1 if index > 0 else None
         replayed = replay(self, index, before, seed) if set(channels) & set(REPLAY) else {}
         if set(channels) & _TRACED:
@@ -110,14 +116,15 @@ class Renderer(View):
             sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
             seen, row, behind = ray, None, None
             if self.stage.images.any:
-                behind = replaced(self.stage, ray, pi, sampler)
+                behind = replaced(self.stage, ray, pi, sampler, bool(set(channels) & {*LAYER}))
                 seen, pi, row = behind.ray, behind.pi, behind.row(self.stage)
             planes = {}
             if set(channels) & _TRACED:
                 radiance = trace(scene, seen, pi, sampler, self.scene.max_depth,
                                  self.candidates, self.lights, behind)
                 if behind and behind.other:
-                    radiance = self._with_other(radiance, behind.other, sampler)
+                    radiance = self._with_other(radiance, behind.other, sampler,
+                                                "layer_sample" in channels)
                 unit = dr.opaque(mi.Float, self.stage.unit)
                 planes = {
                     "color": radiance.emission + radiance.direct + radiance.indirect,
@@ -127,6 +134,7 @@ class Renderer(View):
                     "unshadowed": radiance.unshadowed,
                     "visibility": radiance.visibility,
                     "specular": radiance.specular,
+                    "layer_sample": radiance.straight,
                     "hit_distance": radiance.hit_distance * unit,
                     "hit_id": self.stage.image_id(radiance.hit_shape, radiance.hit_face, row),
                 }
@@ -153,16 +161,17 @@ class Renderer(View):
                 planes |= {name: GBUFFER[name](hit) for name in channels if name in GBUFFER}
             return {name: planes[name] for name in channels}
 
-    def _with_other(self, radiance: Radiance, layer: Layer, sampler: Sampler) -> Radiance:
+    def _with_other(self, radiance: Radiance, layer: Layer, sampler: Sampler,
+                    tell_straight: bool) -> Radiance:
         """Light with that of another layer, which is specular."""
         scene = self.stage.mi_scene
         pi = scene.ray_intersect_preliminary(layer.ray, coherent=False,
                                              active=dr.max(layer.throughput) > 0)
         other = trace(scene, layer.ray, pi, sampler, self.scene.max_depth, self.candidates,
-                      behind=layer)
+                      behind=layer, tell_straight=tell_straight)
         light = other.emission + other.direct + other.indirect
         return replace(radiance, indirect=radiance.indirect + light,
-                       specular=radiance.specular + light)
+                       specular=radiance.specular + light, straight=other.straight)
 
     @dr.syntax
     def _trace_samples(self, index: int, seed: int, part: int, start: int, count: int,

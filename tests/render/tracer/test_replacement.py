@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onespp.render.channels import FRAME, GLOSS
+from onespp.render.channels import FRAME, GLOSS, LAYER
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Disk, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.hard import HARD
@@ -273,11 +273,11 @@ def test_blends_with_glass_are_met_by_chance():
     assert not Renderer(scene, 8, 8).stage.images.any
 
 
-def test_channels_of_gloss_come_with_glass_and_not_with_mirrors():
+def test_channels_of_gloss_and_layers_come_with_glass_and_not_with_mirrors():
     shapes = {"mirror": mirror(), "glass": glass()}
     found = {}
     for name, material in shapes.items():
         scene = Scene("seen", "for a test", (FLOOR, LAMP, Shape("it", Sphere(), material)), CAMERA,
                       1, W, H)
         found[name] = Renderer(scene, 8, 8).channels
-    assert found == {"mirror": FRAME, "glass": FRAME + GLOSS}
+    assert found == {"mirror": FRAME, "glass": FRAME + GLOSS + LAYER}

@@ -1,0 +1,102 @@
+"""Layers left aside: what they are, and that what is told of their lamps has the mean of samples."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from onespp.render.channels import FRAME, GLOSS, LAYER
+from onespp.render.errors import InputError
+from onespp.render.tracer.renderer import Renderer
+from onespp.scenes.description import Camera, Disk, Rectangle, Scene, Shape, Sphere
+from onespp.scenes.materials import diffuse, glass, pane
+from onespp.scenes.meshes import box
+from onespp.scenes.transforms import look_at, rotate, scale, translate
+from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
+
+X, Y = (1, 0, 0), (0, 1, 0)
+BACK = Shape("back", Rectangle(), diffuse((0.2, 0.4, 0.6)),
+             translate((0, 0, 6)) @ rotate(Y, 180) @ scale(9))
+WALL = Shape("wall", Rectangle(), diffuse((0.5, 0.5, 0.5)), translate((0, 0, -3)) @ scale(9))
+CAMERA = Camera(look_at((0, 0, 4), (0, 0, 0)), fov=2)
+r = ((1.5 / 1.000277 - 1) / (1.5 / 1.000277 + 1)) ** 2  # of one side, along the normal
+SHEET = 2 * r / (1 + r)  # of both, one after another
+
+
+def through(*shapes: Shape, size: int = 9, **more) -> Renderer:
+    scene = Scene("seen", "for a test", shapes, CAMERA, 1, size, size, 6, **more)
+    return Renderer(scene, size, size, direct="resampled", sampler="zsobol")
+
+
+def middle(renderer: Renderer) -> dict[str, np.ndarray]:
+    frame = renderer.frame(0, 0, renderer.channels)
+    return {name: frame[name][4, 4] for name in renderer.channels}
+
+
+def test_a_pane_shows_what_is_behind_the_camera_beside_what_is_behind_the_pane():
+    sheet = Shape("pane", Rectangle(), pane(), scale(9))
+    renderer = through(sheet, WALL, replace(BACK, emission=(2.0, 1.0, 0.5)))
+    names, here = renderer.stage.images.names(), middle(renderer)
+    assert [names[here[name]] for name in ("id", "layer_id")] == ["wall", "back in pane"]
+    assert here["layer_share"] == pytest.approx(SHEET, rel=1e-4)
+    assert [here["depth"], here["layer_depth"]] == pytest.approx([7, 10], rel=1e-4)
+    np.testing.assert_allclose(here["layer_albedo"], SHEET * np.array((0.2, 0.4, 0.6)), rtol=1e-4)
+    np.testing.assert_allclose(here["layer_normal"], (0, 0, 1), atol=1e-6)
+    for name in ("layer_lamps", "layer_sample"):  # (the one layer is always sampled)
+        np.testing.assert_allclose(here[name], SHEET * np.array((2.0, 1.0, 0.5)), rtol=1e-4)
+
+
+def test_all_layers_show_their_lamps_and_the_brightest_its_guides():
+    """Of a thick pane the far side's, which has been through the near one twice, is the weaker."""
+    slab = Shape("slab", box((9, 9, 0.5)), glass())
+    here = middle(through(slab, WALL, replace(BACK, emission=(1.0, 1.0, 1.0))))
+    np.testing.assert_allclose(here["layer_lamps"], r + (1 - r) ** 2 * r, rtol=1e-4)
+    assert here["layer_share"] == pytest.approx(r / (r + (1 - r) ** 2), rel=1e-4)
+    assert here["layer_depth"] == pytest.approx(4 - 0.25 + 6 - 0.25, rel=1e-4)
+
+
+@pytest.mark.parametrize("opacity", [0.3, 0.7])
+def test_a_mask_has_the_other_layer_before_or_behind_its_hole(opacity):
+    veil = Shape("veil", Rectangle(), {"type": "mask", "opacity": opacity, "bsdf": diffuse(
+        (0.2, 0.5, 0.1))}, scale(9))
+    renderer = through(veil, WALL, environment=1.0)
+    names, here = renderer.stage.images.names(), middle(renderer)
+    other, albedo, depth = (("veil", (0.06, 0.15, 0.03), 4) if opacity < 0.5 else
+                            ("wall", (0.15,) * 3, 7))
+    assert names[here["layer_id"]] == other
+    assert here["layer_share"] == pytest.approx(0.3, rel=1e-4)
+    assert here["layer_depth"] == pytest.approx(depth, rel=1e-4)
+    np.testing.assert_allclose(here["layer_albedo"], albedo, rtol=2e-3)
+
+
+def test_samples_of_their_lamps_have_the_mean_that_is_told_and_nothing_else_changes():
+    """Behind and in a ball and a veil, under a sky: by rays that turn many ways."""
+    half = {"type": "checkerboard", "color0": 0.3, "color1": 0.8}
+    shapes = (Shape("ball", Sphere(), glass(), translate((-0.03, 0, 0)) @ scale(0.04)), WALL,
+              Shape("lamp", Disk(), diffuse((0, 0, 0)), translate((0.1, 0.2, 1.5)) @ rotate(X, 90)
+                    @ scale(0.1), (9.0, 7.0, 5.0)),
+              Shape("veil", Rectangle(), {"type": "mask", "opacity": half, "bsdf": glass()},
+                    translate((0.06, 0, 0)) @ rotate(Y, 30) @ scale((0.03, 0.06, 1))))
+    renderer = through(*shapes, size=24, environment=(0.5, 1.0, 2.0))
+    whole, less = (renderer.frame(0, 0, names) for names in (
+        renderer.channels, tuple(name for name in renderer.channels if name not in LAYER)))
+    for name in less.images:
+        np.testing.assert_array_equal(whole[name], less[name], err_msg=name)
+    assert (whole["layer_sample"] <= whole["specular"] * (1 + 1e-5) + 1e-6).all()
+    frames = [renderer.frame(0, seed, LAYER) for seed in range(64)]
+    for name in LAYER[:-1]:
+        np.testing.assert_array_equal(frames[0][name], frames[1][name], err_msg=name)
+    samples = [blocks(frame["layer_sample"], 6) for frame in frames]
+    mean, variance = mean_and_variance(samples)
+    assert_same_mean(mean, variance, blocks(frames[0]["layer_lamps"], 6))
+    assert (np.sqrt(variance) < 0.2 * mean)[mean > 0.1].all()
+
+
+def test_scenes_without_such_surfaces_have_no_layers():
+    renderer = through(WALL, environment=1.0)
+    assert renderer.channels[:len(FRAME)] == FRAME
+    assert not {*renderer.channels} & {*LAYER, *GLOSS}
+    with pytest.raises(InputError, match="layer_share need a scene with clear glass or masks"):
+        renderer.frame(0, 0, ("color", "layer_share"))
