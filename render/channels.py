@@ -153,8 +153,8 @@ _ROWS = (
     Channel("roughness", Group.GLOSS, ("roughness",), HALF, Display.UNIT, 1.0,
             "GGX alpha of the surface's glossy lobe; 0: a mirror or a hole, 1: no such lobe"),
     Channel("layer_share", Group.LAYER, ("layer.A",), FLOAT, Display.UNIT, 0.0,
-            "share that the brightest other layer has in what glass or a mask shows, by what of its "
-            "light gets here; 0: there is none"),
+            "share that the brightest other layer has in what glass or a mask shows, by what of "
+            "its light gets here; 0: there is none"),
     Channel("layer_albedo", Group.LAYER, _rgb("layer.albedo"), HALF, Display.LIGHT, 0.0,
             "`albedo` of that layer's surface, less what takes of its light on the way"),
     Channel("layer_normal", Group.LAYER, ("layer.N.X", "layer.N.Y", "layer.N.Z"), FLOAT,

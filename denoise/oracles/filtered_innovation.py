@@ -80,7 +80,7 @@ def turn_of(previous: Frame, frame: Frame) -> np.ndarray:
 
 def color_of(frame: Frame, signals: dict[str, np.ndarray]) -> np.ndarray:
     direct = sum(signals[name] * u for name, u in unshadowed_of(frame).items())
-    lamps = frame["layer_lamps"] if "layer_lamps" in frame else 0
+    lamps = frame.images.get("layer_lamps", 0)
     return frame["emission"] + lamps + direct + texture_of(frame) * signals["L"] + signals["G"]
 
 

@@ -156,6 +156,7 @@ def replaced(stage: MitsubaScene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3
                 other.opacity = dr.select(taken, dr.select(is_hole, o, 1), other.opacity)
             picked = dr.select(taken, brightness, picked)
             if dr.hint(tell_aside, mode="scalar"):
+                assert aside is not None
                 is_one = brightness > 0
                 goes_in = is_mask | ~passes
                 there = dr.select(is_hole, way, stepped(

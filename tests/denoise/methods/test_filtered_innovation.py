@@ -61,8 +61,18 @@ def with_lobes(frame):
                        albedo=np.where(bare, 1, frame["albedo"]))
 
 
-def split(height, width, count=3, lobes=True):
-    """Moving frames with all channels that the method uses, a lamp, and three objects."""
+def with_layers(frame, rng):
+    """The frame with lamps that other layers show, of which some pixels have found more, others
+    nothing."""
+    lamps = rng.random(frame["color"].shape) * (rng.random((*frame["id"].shape, 1)) < 0.3)
+    sample = lamps * rng.integers(0, 3, (*frame["id"].shape, 1))
+    return with_images(frame, layer_lamps=lamps, layer_sample=sample, **{
+        name: frame[name] + sample for name in ("color", "indirect", "specular")})
+
+
+def split(height, width, count=3, lobes=True, layers=False):
+    """Moving frames with all channels that the method uses, but for those of layers unless asked
+    for, a lamp, and three objects."""
     frames = []
     for i, frame in enumerate(moving(height, width, count)):
         rng = np.random.default_rng(100 + i)
@@ -77,6 +87,7 @@ def split(height, width, count=3, lobes=True):
         frame = with_images(frame, albedo=albedo, unshadowed=unshadowed, color=color,
                             visibility=visibility, direct=direct, specular=specular)
         frame = with_lobes(frame) if lobes else frame
+        frame = with_layers(frame, rng) if layers else frame
         frames.append(with_neighbour(with_shadow_rays(frame, i)))
     return frames
 
@@ -85,7 +96,7 @@ def split(height, width, count=3, lobes=True):
 @pytest.mark.parametrize(("height", "width", "levels", "sharp_levels"), [
     (19, 26, 4, 2), (7, 5, 4, 2), (1, 9, 4, 2), (9, 70, 7, 6), (12, 9, 6, 3)])
 def test_it_is_the_formula_in_float64(height, width, levels, sharp_levels, shadows):
-    frames = split(height, width, lobes=shadows)
+    frames = split(height, width, lobes=shadows, layers=shadows)
     method = FilteredInnovation(
         innovation_levels=levels, output_levels=3, sharp_innovation_levels=sharp_levels,
         sharp_output_levels=2, follow_shadows=shadows)
@@ -205,6 +216,18 @@ def test_the_signals_add_up_to_the_colour():
                 expected = expected - frame["emission"]
             np.testing.assert_allclose(stencil.image(signals.color(signals.listed)), expected,
                                        rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("gloss", [True, False])
+def test_lamps_of_layers_are_what_is_told_of_them_and_not_what_was_found(gloss):
+    (frame,), (plain,) = split(9, 14, 1, layers=True), split(9, 14, 1)
+    stencil = Stencil(9, 14, 1)
+    signals, without = (read_signals(f, read_color(f, stencil), stencil, True, gloss)
+                        for f in (frame, plain))
+    for a, b in zip(signals.listed, without.listed, strict=True):
+        np.testing.assert_allclose(a.luminance.numpy(), b.luminance.numpy(), atol=1e-4)
+    np.testing.assert_allclose(stencil.image(signals.color(signals.listed)),
+                               plain["color"] + frame["layer_lamps"], rtol=1e-4, atol=1e-5)
 
 
 def test_it_follows_a_change_of_light_at_once_where_plain_accumulation_lags():
