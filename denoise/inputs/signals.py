@@ -30,7 +30,7 @@ A frame that lacks the split has D in L; one without direct light, its colour.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
@@ -45,10 +45,11 @@ from onespp.render.channels import GROUPED, UNSHADOWED
 from onespp.render.frame import Frame
 
 from .demodulation import Texture, read_texture
+from .layers import LAYERS
 from .repair import repair
 
 USED = ("direct", "indirect", "unshadowed", "visibility", "specular", "roughness",
-        "layer_lamps", "layer_sample", *GROUPED)
+        "layer_lamps", "layer_sample", *LAYERS, *GROUPED)
 LARGEST_VISIBILITY = 2.0
 
 
@@ -88,6 +89,7 @@ class Signals:
             group's visibility is y, 0 where the ray went to another group.
         unshadowed: what each V is a share of. texture: albedo and emission.
         chosen: None where all lights are one. roughness: where G is apart and its lobes are known.
+        of_gloss: texture of G, where that is known (`layers.py`).
     """
 
     kinds: tuple[SignalKind, ...]
@@ -96,6 +98,7 @@ class Signals:
     texture: Texture
     chosen: Chosen | None = None
     roughness: Float | None = None
+    of_gloss: Texture = field(default_factory=Texture)
 
     @property
     def groups(self) -> int:
@@ -108,19 +111,20 @@ class Signals:
         unshadowed = iter(self.unshadowed)
         for kind, signal in zip(self.kinds[1:], signals[1:], strict=True):
             if kind is SignalKind.GLOSSY:
-                color = Color(*[c + g for c, g in zip(color, _color(signal))])
+                gloss = self.of_gloss.modulate(_color(signal))
+                color = Color(*[c + g for c, g in zip(color, gloss)])
             else:
                 color = _with(color, signal.luminance, next(unshadowed))
         return color
 
 
 def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
-                 gloss: bool) -> Signals:
+                 gloss: bool, of_gloss: Frame | None = None) -> Signals:
     """The signals of a frame; `color` is used where it has no direct and indirect light.
 
     Args:
         demodulate: divide by the albedo, where the frame has it.
-        gloss: G as a signal of its own, where the frame has it.
+        gloss: G as a signal of its own, where the frame has it. of_gloss: of `surface_of_gloss`.
     """
     texture = read_texture(frame, stencil, demodulate)
     if "direct" not in frame or "indirect" not in frame:
@@ -139,12 +143,20 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
         texture = texture.with_emission(Color(*lamps))
         light = Color(*[c - f for c, f in zip(light, found)])
     kinds, apart, unshadowed, chosen, roughness = [SignalKind.DIFFUSE], [], [], None, None
+    texture_of_gloss = Texture()
     if gloss and "specular" in frame:
         specular = Color(*load("specular"))
         if found is not None:
             specular = Color(*[c - f for c, f in zip(specular, found)])
         light = Color(*[c - g for c, g in zip(light, specular)])
-        if "roughness" in frame:
+        if of_gloss is not None:
+            (roughness,) = stencil.load(of_gloss["roughness"])
+            if demodulate:
+                is_layer = of_gloss["roughness"] != frame["roughness"]
+                albedo = np.where(is_layer[..., None], of_gloss["albedo"], np.float32(1))
+                texture_of_gloss = Texture(Color(*stencil.load(albedo)))
+                specular = texture_of_gloss.demodulate(specular)
+        elif "roughness" in frame:
             (roughness,) = load("roughness")
         kinds.append(SignalKind.GLOSSY)
         apart.append(_of_light(specular))
@@ -171,7 +183,8 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
         apart[0] = Signal(*[g + m for g, m in zip(apart[0], more)])
         light = Color(*[dr.select(is_bare, 0, c) for c in light])
     diffuse = _of_light(Texture(texture.albedo).demodulate(light))
-    return Signals(tuple(kinds), [diffuse, *apart], unshadowed, texture, chosen, roughness)
+    return Signals(tuple(kinds), [diffuse, *apart], unshadowed, texture, chosen, roughness,
+                   texture_of_gloss)
 
 
 def _capped(visibility: Float) -> Float:

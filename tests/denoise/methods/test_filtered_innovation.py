@@ -62,8 +62,28 @@ def with_lobes(frame):
 
 
 def with_layers(frame, rng):
-    """The frame with lamps that other layers show, of which some pixels have found more, others
-    nothing."""
+    """The frame with a floor of tiles of two objects that a pane before its left half reflects, and
+    with lamps in that, of which some pixels have found more, others nothing."""
+    height, width = frame["id"].shape
+    normal, point = np.array([0.1, 0.9, 0.3]), np.array([0, -1.5, 0])
+    normal /= np.linalg.norm(normal)
+    eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
+    y, x = np.mgrid[:height, :width] + 0.5
+    on_screen = np.stack([x, y, 0 * x + 1, 0 * x + 1], -1) @ np.linalg.inv(
+        frame.screen_from_world).T
+    ray = on_screen[..., :3] / on_screen[..., 3:] - eye
+    t = normal @ (point - eye) / (ray @ normal)
+    there = (x < width / 2) & (t > 0)
+    depth = np.where(there, t * (on_screen @ frame.screen_from_world[3]) / on_screen[..., 3], 0)
+    place = np.where(there[..., None], eye + t[..., None] * ray, 0)
+    tiles = np.floor(3 * place).sum(-1).astype(int) % 2
+    is_pane = (x < width / 2) & (y > height / 5)
+    frame = with_images(
+        frame, roughness=np.where(is_pane, 0, frame["roughness"]),
+        layer_share=np.where(is_pane, 0.1 + 0.1 * y / height, 0),
+        layer_albedo=np.where(is_pane & there, 0.02 + 0.1 * tiles, 0)[..., None] * [1, 0.8, 0.3],
+        layer_normal=np.where(there[..., None], normal, 0), layer_depth=depth,
+        layer_id=np.where(there, 2 * tiles, -1))
     lamps = rng.random(frame["color"].shape) * (rng.random((*frame["id"].shape, 1)) < 0.3)
     sample = lamps * rng.integers(0, 3, (*frame["id"].shape, 1))
     return with_images(frame, layer_lamps=lamps, layer_sample=sample, **{
@@ -96,7 +116,7 @@ def split(height, width, count=3, lobes=True, layers=False):
 @pytest.mark.parametrize(("height", "width", "levels", "sharp_levels"), [
     (19, 26, 4, 2), (7, 5, 4, 2), (1, 9, 4, 2), (9, 70, 7, 6), (12, 9, 6, 3)])
 def test_it_is_the_formula_in_float64(height, width, levels, sharp_levels, shadows):
-    frames = split(height, width, lobes=shadows, layers=shadows)
+    frames = split(height, width, lobes=shadows, layers=shadows and height > 9)
     method = FilteredInnovation(
         innovation_levels=levels, output_levels=3, sharp_innovation_levels=sharp_levels,
         sharp_output_levels=2, follow_shadows=shadows)
