@@ -87,7 +87,7 @@ def _rgb(layer: str) -> tuple[str, ...]:
 
 MOST_GROUPS = 4  # of lights, each with a visibility of its own
 SUN = -2  # `light_id` of the environment's brightest spot, where it is a light of its own
-TRACING = 2
+TRACING = 3
 """Counts the changes of what frames hold. Raise it whenever the same scene, frame and seed give
 other values than rounding explains in any channel, of frames or references: sequences and data sets
 begun before are then not continued. One number serves both, since what changes the mean of light
@@ -95,13 +95,15 @@ changes both, and more than one would let a folder hold frames that its referenc
 
 2: the first surface behind mirrors, clear glass and masks is the pixel's (`tracer/replacement.py`);
 under half-open masks mirrors and glass show lamps; the sun of a sky is a light (`lights/sun.py`).
+3: lamps in other layers of glass and masks have no noise (`tracer/layers.py`).
 """
 
 _ROWS = (
     Channel("color", Group.RADIANCE, ("R", "G", "B"), FLOAT, Display.LIGHT, 0.0,
             "radiance, linear Rec. 709; emission + direct + indirect (+ the environment)"),
     Channel("emission", Group.RADIANCE, _rgb("emission"), FLOAT, Display.LIGHT, 0.0,
-            "radiance that the visible surface (or the environment) emits itself"),
+            "radiance that the visible surface (or the environment) emits itself, with that of "
+            "lamps and the environment in other layers of glass and masks; no noise"),
     Channel("direct", Group.RADIANCE, _rgb("direct"), FLOAT, Display.LIGHT, 0.0,
             "light from emitters scattered once, at the first hit; not demodulated"),
     Channel("indirect", Group.RADIANCE, _rgb("indirect"), FLOAT, Display.LIGHT, 0.0,
@@ -163,10 +165,6 @@ _ROWS = (
             "its `depth`, of the image; 0: none, or nothing there"),
     Channel("layer_id", Group.LAYER, ("layer.ID",), OBJECT_ID, Display.OBJECT, -1.0,
             "its `id`, of the image; -1: none, or nothing there"),
-    Channel("layer_lamps", Group.LAYER, _rgb("layer.lamps"), FLOAT, Display.LIGHT, 0.0,
-            "radiance of the lamps and the environment that other layers show, noise-free"),
-    Channel("layer_sample", Group.LAYER, _rgb("layer.sample"), FLOAT, Display.LIGHT, 0.0,
-            "the noisy part of `specular` that has the mean `layer_lamps`"),
     Channel("replay", Group.REPLAY, ("replay.direct", "replay.indirect"), FLOAT, Display.UNIT, -1.0,
             "luminance of some samples of the frame one number before (in the sequence or not), "
             "shaded again here; -1: no sample"),

@@ -10,8 +10,7 @@ mirror, in renderers that write 0 there) counts as albedo 1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from operator import add
+from dataclasses import dataclass
 
 import drjit as dr
 import numpy as np
@@ -34,11 +33,6 @@ class Texture:
     albedo: Color | None = None
     emission: Color | None = None
     zero_albedo: Bool | None = None
-
-    def with_emission(self, more: Color) -> Texture:
-        """With more light that is not filtered."""
-        emission = more if self.emission is None else Color(*map(add, self.emission, more))
-        return replace(self, emission=emission)
 
     def demodulate(self, color: Color) -> Color:
         """The light that makes a colour on this texture."""

@@ -21,9 +21,6 @@ group. With y, omega and P of `resampling.py`,
 What the BSDF's sample finds of the lights is in L. (As a share of U - sum U_g it loses 0.6 dB on
 average: midpoints of a sky's strata say little of what a sample of a lobe finds.)
 
-Where a frame tells of other layers than the surface (`render/tracer/layers.py`), I and G are less
-what a sample found of their lamps, and E has what is there of them, without noise.
-
 A frame that lacks the split has D in L; one without direct light, its colour.
 """
 
@@ -49,7 +46,7 @@ from .layers import LAYERS
 from .repair import repair
 
 USED = ("direct", "indirect", "unshadowed", "visibility", "specular", "roughness",
-        "layer_lamps", "layer_sample", *LAYERS, *GROUPED)
+        *LAYERS, *GROUPED)
 LARGEST_VISIBILITY = 2.0
 
 
@@ -137,17 +134,11 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
 
     if "emission" in frame and not texture.emission:
         texture = Texture(texture.albedo, Color(*load("emission")), texture.zero_albedo)
-    light, found = Color(*[d + i for d, i in zip(load("direct"), load("indirect"))]), None
-    if "layer_lamps" in frame and "layer_sample" in frame:
-        lamps, found = load("layer_lamps"), load("layer_sample")
-        texture = texture.with_emission(Color(*lamps))
-        light = Color(*[c - f for c, f in zip(light, found)])
+    light = Color(*[d + i for d, i in zip(load("direct"), load("indirect"))])
     kinds, apart, unshadowed, chosen, roughness = [SignalKind.DIFFUSE], [], [], None, None
     texture_of_gloss = Texture()
     if gloss and "specular" in frame:
         specular = Color(*load("specular"))
-        if found is not None:
-            specular = Color(*[c - f for c, f in zip(specular, found)])
         light = Color(*[c - g for c, g in zip(light, specular)])
         if of_gloss is not None:
             (roughness,) = stencil.load(of_gloss["roughness"])

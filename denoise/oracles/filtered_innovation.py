@@ -36,8 +36,6 @@ def signals_of(frame: Frame) -> dict[str, np.ndarray]:
     """L, G and V, (h, w, c), then y of each group."""
     light = frame["direct"].astype(float) + frame["indirect"] - frame["specular"]
     specular = frame["specular"].astype(float)
-    if "layer_sample" in frame:
-        specular = specular - frame["layer_sample"]
     unshadowed = unshadowed_of(frame)
     told, chance = {"V": np.minimum(frame["visibility"].astype(float), 2)[..., None]}, 1.0
     if "group" in frame:
@@ -118,8 +116,7 @@ def turn_of(previous: Frame, frame: Frame) -> np.ndarray:
 
 def color_of(frame: Frame, signals: dict[str, np.ndarray]) -> np.ndarray:
     direct = sum(signals[name] * u for name, u in unshadowed_of(frame).items())
-    lamps = frame.images.get("layer_lamps", 0)
-    return (frame["emission"] + lamps + direct + texture_of(frame) * signals["L"]
+    return (frame["emission"] + direct + texture_of(frame) * signals["L"]
             + layer_texture_of(frame) * signals["G"])
 
 

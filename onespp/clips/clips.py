@@ -25,10 +25,9 @@ from .store import HALF, REFERENCE, Store
 from .view import Turn, seen_through
 
 MOTION = "motion"
-_LIGHT = (*channels_of(Group.RADIANCE), "specular", "layer_lamps", "layer_sample",
+_LIGHT = (*channels_of(Group.RADIANCE), "specular",
           *(name for name in CHANNELS if name.startswith("unshadowed")))
-_WITHOUT_NOISE = (*channels_of(Group.GUIDES), "roughness", MOTION,
-                  *(name for name in LAYER if name != "layer_sample"))
+_WITHOUT_NOISE = (*channels_of(Group.GUIDES), "roughness", MOTION, *LAYER)
 _EVERY = 4  # pixels by which the mean motion of a crop is found
 
 

@@ -88,12 +88,6 @@ def layer_share(hit: PrimaryHit) -> mi.Float:
     return hit.behind.layer_share
 
 
-def layer_lamps(hit: PrimaryHit) -> mi.Color3f:
-    assert hit.behind is not None
-    assert hit.behind.aside is not None
-    return hit.behind.aside.lamps
-
-
 def _of_layer(guide: Callable[[PrimaryHit], Any]) -> Callable[[PrimaryHit], Any]:
     """The same guide of what the brightest layer left aside comes to."""
     def of_layer(hit: PrimaryHit) -> Any:
@@ -116,5 +110,4 @@ GBUFFER: dict[str, Callable[[PrimaryHit], mi.Float | mi.Vector3f | mi.Color3f | 
     "layer_normal": _of_layer(normal),
     "layer_depth": _of_layer(depth),
     "layer_id": _of_layer(object_id),
-    "layer_lamps": layer_lamps,
 }

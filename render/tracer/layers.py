@@ -7,8 +7,8 @@ not. What they come to gives guides of the brightest of them; and the lamps and 
 meet there, `lamps`, is light that a path finds by chance, often by rare chance: the picture of a
 lamp in a ball of glass. A path that takes the same turns at all surfaces is *straight*. One layer
 is traced, and at each surface one way taken, by the probabilities that weigh their light, so that
-light found by straight paths has the mean `lamps`: to take the one from a frame's light and add the
-other takes their noise out, and leaves the mean.
+light found by straight paths has the mean `lamps`. So a frame has the one instead of the other, as
+emission, which leaves the mean and takes its noise out.
 """
 
 from __future__ import annotations

@@ -30,12 +30,12 @@ from .camera_rays import camera_matrices
 from .gbuffer import GBUFFER, PrimaryHit
 from .lights.candidates import candidates_for
 from .path import Radiance, sum_of_samples, trace
-from .replacement import Layer, replaced
+from .replacement import Replaced, replaced
 from .replay import replay
 from .sampler import FRAME_STREAM, REFERENCE_STREAM, Sampler, Sobol, keys_from_seed
 from .view import View
 
-_TRACED = {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS, "layer_sample"}
+_TRACED = {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS}
 """Channels that take more than the first hit."""
 
 
@@ -116,15 +116,14 @@ class Renderer(View):
             sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
             seen, row, behind = ray, None, None
             if self.stage.images.any:
-                behind = replaced(self.stage, ray, pi, sampler, bool(set(channels) & {*LAYER}))
+                behind = replaced(self.stage, ray, pi, sampler)
                 seen, pi, row = behind.ray, behind.pi, behind.row(self.stage)
             planes = {}
             if set(channels) & _TRACED:
                 radiance = trace(scene, seen, pi, sampler, self.scene.max_depth,
                                  self.candidates, self.lights, behind)
                 if behind and behind.other:
-                    radiance = self._with_other(radiance, behind.other, sampler,
-                                                "layer_sample" in channels)
+                    radiance = self._with_layers(radiance, behind, sampler)
                 unit = dr.opaque(mi.Float, self.stage.unit)
                 planes = {
                     "color": radiance.emission + radiance.direct + radiance.indirect,
@@ -134,7 +133,6 @@ class Renderer(View):
                     "unshadowed": radiance.unshadowed,
                     "visibility": radiance.visibility,
                     "specular": radiance.specular,
-                    "layer_sample": radiance.straight,
                     "hit_distance": radiance.hit_distance * unit,
                     "hit_id": self.stage.image_id(radiance.hit_shape, radiance.hit_face, row),
                 }
@@ -161,17 +159,20 @@ class Renderer(View):
                 planes |= {name: GBUFFER[name](hit) for name in channels if name in GBUFFER}
             return {name: planes[name] for name in channels}
 
-    def _with_other(self, radiance: Radiance, layer: Layer, sampler: Sampler,
-                    tell_straight: bool) -> Radiance:
-        """Light with that of another layer, which is specular."""
-        scene = self.stage.mi_scene
+    def _with_layers(self, radiance: Radiance, behind: Replaced, sampler: Sampler) -> Radiance:
+        """Light with that of other layers: their lamps, and of one of them the rest, specular."""
+        scene, layer, aside = self.stage.mi_scene, behind.other, behind.aside
+        assert layer is not None
+        assert aside is not None
         pi = scene.ray_intersect_preliminary(layer.ray, coherent=False,
                                              active=dr.max(layer.throughput) > 0)
         other = trace(scene, layer.ray, pi, sampler, self.scene.max_depth, self.candidates,
-                      behind=layer, tell_straight=tell_straight)
-        light = other.emission + other.direct + other.indirect
-        return replace(radiance, indirect=radiance.indirect + light,
-                       specular=radiance.specular + light, straight=other.straight)
+                      behind=layer, tell_straight=True)
+        assert other.straight is not None
+        light = other.emission + other.direct + other.indirect - other.straight
+        light = dr.maximum(light, 0)  # (rounding)
+        return replace(radiance, emission=radiance.emission + aside.lamps,
+                       indirect=radiance.indirect + light, specular=radiance.specular + light)
 
     @dr.syntax
     def _trace_samples(self, index: int, seed: int, part: int, start: int, count: int,

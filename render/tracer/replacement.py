@@ -101,12 +101,11 @@ class Replaced:
 
 @dr.syntax
 def replaced(stage: MitsubaScene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f,
-             sampler: Sampler, tell_aside: bool = False) -> Replaced:
+             sampler: Sampler) -> Replaced:
     """The surfaces behind mirrors and glass, of rays and their first hits.
 
     Args:
-        stage: has images. sampler: advanced if they are layered. tell_aside: whether to tell what
-            the layers left aside are, if they are layered.
+        stage: has images. sampler: advanced if they are layered.
     """
     scene, max_depth = stage.mi_scene, stage.description.max_depth
     rows, masks, layered = stage.image_rows, stage.masks, stage.images.layered
@@ -115,7 +114,7 @@ def replaced(stage: MitsubaScene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3
     way, pi = Way.of(ray), mi.PreliminaryIntersection3f(pi)
     opacity = None if masks is None else mi.Float(1)
     other = Layer(mi.Ray3f(ray), mi.Color3f(0), mi.UInt32(0), opacity)
-    aside = Aside.none(ray) if tell_aside else None
+    aside = Aside.none(ray) if layered else None
     total, picked = mi.Float(0), mi.Float(1)
     left = mi.Float(0)
     if dr.hint(layered, mode="scalar"):
@@ -155,17 +154,16 @@ def replaced(stage: MitsubaScene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3
             if dr.hint(masks is not None, mode="scalar"):
                 other.opacity = dr.select(taken, dr.select(is_hole, o, 1), other.opacity)
             picked = dr.select(taken, brightness, picked)
-            if dr.hint(tell_aside, mode="scalar"):
-                assert aside is not None
-                is_one = brightness > 0
-                goes_in = is_mask | ~passes
-                there = dr.select(is_hole, way, stepped(
-                    way, si, pi.t, shape, wo_aside, dr.select(is_mask | passes, 1, beyond.eta),
-                    goes_in, left_aside))
-                met = scene.ray_intersect_preliminary(there.ray, coherent=False,
-                                                      active=is_one & ~is_hole)
-                aside = aside.with_layer(scene, there, dr.select(is_hole, pi, met),
-                                         dr.select(is_hole, o, 1), max_depth, is_one)
+            assert aside is not None
+            is_one = brightness > 0
+            goes_in = is_mask | ~passes
+            there = dr.select(is_hole, way, stepped(
+                way, si, pi.t, shape, wo_aside, dr.select(is_mask | passes, 1, beyond.eta),
+                goes_in, left_aside))
+            met = scene.ray_intersect_preliminary(there.ray, coherent=False,
+                                                  active=is_one & ~is_hole)
+            aside = aside.with_layer(scene, there, dr.select(is_hole, pi, met),
+                                     dr.select(is_hole, o, 1), max_depth, is_one)
             wo = dr.select(is_hole, -si.wi, dr.select(passes, beyond.wo, wo))
             weight = dr.select(is_hole, 1 - o, dr.select(passes, share, weight))
             eta = dr.select(passes & ~is_hole, beyond.eta, 1)
@@ -178,7 +176,7 @@ def replaced(stage: MitsubaScene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3
             active &= pi.is_valid() & (way.before + 1 < max_depth)
 
     other.throughput *= dr.select(total > 0, total / picked, 0)
-    return _came_to(way, pi, opacity, other if layered else None, aside if layered else None)
+    return _came_to(way, pi, opacity, other if layered else None, aside)
 
 
 def _came_to(way: Way, pi: mi.PreliminaryIntersection3f, opacity: mi.Float | None = None,

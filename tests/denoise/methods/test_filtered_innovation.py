@@ -61,9 +61,8 @@ def with_lobes(frame):
                        albedo=np.where(bare, 1, frame["albedo"]))
 
 
-def with_layers(frame, rng):
-    """The frame with a floor of tiles of two objects that a pane before its left half reflects, and
-    with lamps in that, of which some pixels have found more, others nothing."""
+def with_layers(frame):
+    """The frame with a floor of tiles of two objects that a pane before its left half reflects."""
     height, width = frame["id"].shape
     normal, point = np.array([0.1, 0.9, 0.3]), np.array([0, -1.5, 0])
     normal /= np.linalg.norm(normal)
@@ -78,16 +77,12 @@ def with_layers(frame, rng):
     place = np.where(there[..., None], eye + t[..., None] * ray, 0)
     tiles = np.floor(3 * place).sum(-1).astype(int) % 2
     is_pane = (x < width / 2) & (y > height / 5)
-    frame = with_images(
+    return with_images(
         frame, roughness=np.where(is_pane, 0, frame["roughness"]),
         layer_share=np.where(is_pane, 0.1 + 0.1 * y / height, 0),
         layer_albedo=np.where(is_pane & there, 0.02 + 0.1 * tiles, 0)[..., None] * [1, 0.8, 0.3],
         layer_normal=np.where(there[..., None], normal, 0), layer_depth=depth,
         layer_id=np.where(there, 2 * tiles, -1))
-    lamps = rng.random(frame["color"].shape) * (rng.random((*frame["id"].shape, 1)) < 0.3)
-    sample = lamps * rng.integers(0, 3, (*frame["id"].shape, 1))
-    return with_images(frame, layer_lamps=lamps, layer_sample=sample, **{
-        name: frame[name] + sample for name in ("color", "indirect", "specular")})
 
 
 def split(height, width, count=3, lobes=True, layers=False):
@@ -107,7 +102,7 @@ def split(height, width, count=3, lobes=True, layers=False):
         frame = with_images(frame, albedo=albedo, unshadowed=unshadowed, color=color,
                             visibility=visibility, direct=direct, specular=specular)
         frame = with_lobes(frame) if lobes else frame
-        frame = with_layers(frame, rng) if layers else frame
+        frame = with_layers(frame) if layers else frame
         frames.append(with_neighbour(with_shadow_rays(frame, i)))
     return frames
 
@@ -236,18 +231,6 @@ def test_the_signals_add_up_to_the_colour():
                 expected = expected - frame["emission"]
             np.testing.assert_allclose(stencil.image(signals.color(signals.listed)), expected,
                                        rtol=1e-4, atol=1e-5)
-
-
-@pytest.mark.parametrize("gloss", [True, False])
-def test_lamps_of_layers_are_what_is_told_of_them_and_not_what_was_found(gloss):
-    (frame,), (plain,) = split(9, 14, 1, layers=True), split(9, 14, 1)
-    stencil = Stencil(9, 14, 1)
-    signals, without = (read_signals(f, read_color(f, stencil), stencil, True, gloss)
-                        for f in (frame, plain))
-    for a, b in zip(signals.listed, without.listed, strict=True):
-        np.testing.assert_allclose(a.luminance.numpy(), b.luminance.numpy(), atol=1e-4)
-    np.testing.assert_allclose(stencil.image(signals.color(signals.listed)),
-                               plain["color"] + frame["layer_lamps"], rtol=1e-4, atol=1e-5)
 
 
 def test_it_follows_a_change_of_light_at_once_where_plain_accumulation_lags():
