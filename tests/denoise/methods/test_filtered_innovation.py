@@ -62,10 +62,10 @@ def with_lobes(frame):
 
 
 def with_layers(frame, rng):
-    """The frame with a floor of tiles of two objects that a pane before its left half reflects, and
+    """The frame with a wall of tiles of two objects that a pane before its left half shows, too, and
     with lamps in that, of which some pixels have found more, others nothing."""
     height, width = frame["id"].shape
-    normal, point = np.array([0.1, 0.9, 0.3]), np.array([0, -1.5, 0])
+    normal, point = np.array([0.1, -0.3, -0.9]), np.array([0, 0, 9])
     normal /= np.linalg.norm(normal)
     eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
     y, x = np.mgrid[:height, :width] + 0.5
@@ -76,7 +76,7 @@ def with_layers(frame, rng):
     there = (x < width / 2) & (t > 0)
     depth = np.where(there, t * (on_screen @ frame.screen_from_world[3]) / on_screen[..., 3], 0)
     place = np.where(there[..., None], eye + t[..., None] * ray, 0)
-    tiles = np.floor(3 * place).sum(-1).astype(int) % 2
+    tiles = np.floor(place[..., :2]).sum(-1).astype(int) % 2
     is_pane = (x < width / 2) & (y > height / 5)
     frame = with_images(
         frame, roughness=np.where(is_pane, 0, frame["roughness"]),
