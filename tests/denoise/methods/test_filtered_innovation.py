@@ -62,8 +62,8 @@ def with_lobes(frame):
 
 
 def with_layers(frame, rng):
-    """The frame with a wall of tiles of two objects that a pane before its left half shows, too, and
-    with lamps in that, of which some pixels have found more, others nothing."""
+    """The frame with a wall of tiles, of two objects, that a pane before its left half shows too,
+    and with lamps in that, of which some pixels have found more, others nothing."""
     height, width = frame["id"].shape
     normal, point = np.array([0.1, -0.3, -0.9]), np.array([0, 0, 9])
     normal /= np.linalg.norm(normal)
@@ -320,8 +320,9 @@ def test_a_moving_object_and_its_background_keep_histories_of_their_own():
     np.testing.assert_allclose(image, frames[-1]["color"], rtol=2e-2)
 
 
-def test_five_frames_are_one_recording_and_parameters_compile_nothing():
-    frames = split(16, 20, 5)
+@pytest.mark.parametrize("layers", [False, True])
+def test_five_frames_are_one_recording_and_parameters_compile_nothing(layers):
+    frames = split(16, 20, 5, layers=layers)
     run(FilteredInnovation(), frames)
     other = FilteredInnovation(light_alpha=0.1, visibility_sigma=3.0, fade_frames=3.0, penumbra=2.0,
                                sigma_plane=0.02, max_history_length=9.0, plane_tolerance=0.03,
@@ -331,6 +332,11 @@ def test_five_frames_are_one_recording_and_parameters_compile_nothing():
     passes = state.passes
     steps = [passes.follow_shadows, passes.find_innovations, passes.merge, passes.pack,
              *(level.step for level in (passes.spread, *passes.smoothing, *passes.output))]
+    assert (state.layered is not None) == layers
+    if layers:
+        passes = state.layered.passes
+        steps += [passes.find_innovations, passes.merge, passes.pack,
+                  *(level.step for level in (*passes.smoothing, *passes.output))]
     assert [step.recordings for step in steps] == [1] * len(steps)
 
 
