@@ -86,7 +86,8 @@ class Signals:
             group's visibility is y, 0 where the ray went to another group.
         unshadowed: what each V is a share of. texture: albedo and emission.
         chosen: None where all lights are one. roughness: where G is apart and its lobes are known.
-        of_gloss: texture of G, where that is known (`layers.py`).
+        lobe: the same, but 1 where G is the (diffuse) light of a layer. of_gloss: texture of G,
+            where that is known (`layers.py`).
     """
 
     kinds: tuple[SignalKind, ...]
@@ -95,6 +96,7 @@ class Signals:
     texture: Texture
     chosen: Chosen | None = None
     roughness: Float | None = None
+    lobe: Float | None = None
     of_gloss: Texture = field(default_factory=Texture)
 
     @property
@@ -136,19 +138,20 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
         texture = Texture(texture.albedo, Color(*load("emission")), texture.zero_albedo)
     light = Color(*[d + i for d, i in zip(load("direct"), load("indirect"))])
     kinds, apart, unshadowed, chosen, roughness = [SignalKind.DIFFUSE], [], [], None, None
-    texture_of_gloss = Texture()
+    texture_of_gloss, lobe = Texture(), None
     if gloss and "specular" in frame:
         specular = Color(*load("specular"))
         light = Color(*[c - g for c, g in zip(light, specular)])
+        if "roughness" in frame:
+            lobe = roughness = load("roughness")[0]
         if of_gloss is not None:
-            (roughness,) = stencil.load(of_gloss["roughness"])
+            is_layer = (of_gloss["roughness"] == 1) & (frame["roughness"] == 0)
+            (there,) = stencil.load(is_layer.astype(np.float32))
+            lobe = dr.select(there > 0, stencil.Float(1), roughness)
             if demodulate:
-                is_layer = of_gloss["roughness"] != frame["roughness"]
                 albedo = np.where(is_layer[..., None], of_gloss["albedo"], np.float32(1))
                 texture_of_gloss = Texture(Color(*stencil.load(albedo)))
                 specular = texture_of_gloss.demodulate(specular)
-        elif "roughness" in frame:
-            (roughness,) = load("roughness")
         kinds.append(SignalKind.GLOSSY)
         apart.append(_of_light(specular))
     if "unshadowed" in frame and "visibility" in frame:
@@ -167,15 +170,15 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
             light = _with(light, -v, u)
         kinds += [SignalKind.VISIBILITY] * len(visibility)
         apart += [Signal(None, v, None) for v in visibility]
-    if roughness is not None and texture.albedo:
+    if lobe is not None and texture.albedo:
         white = [a >= 1 for a in texture.albedo]
-        is_bare = (roughness < 1) & white[0] & white[1] & white[2]
+        is_bare = (lobe < 1) & white[0] & white[1] & white[2]
         more = _of_light(Color(*[dr.select(is_bare, c, 0) for c in light]))
         apart[0] = Signal(*[g + m for g, m in zip(apart[0], more)])
         light = Color(*[dr.select(is_bare, 0, c) for c in light])
     diffuse = _of_light(Texture(texture.albedo).demodulate(light))
     return Signals(tuple(kinds), [diffuse, *apart], unshadowed, texture, chosen, roughness,
-                   texture_of_gloss)
+                   lobe, texture_of_gloss)
 
 
 def _capped(visibility: Float) -> Float:

@@ -76,14 +76,12 @@ def layer_texture_of(frame: Frame) -> np.ndarray:
 
 
 def seen_in_gloss(frame: Frame) -> Frame:
-    """The frame with the surfaces that glossy light is from, diffuse where they are layers."""
-    h, w = frame["id"].shape
+    """The frame with the surfaces that glossy light is from."""
     images, seen = dict(frame.images), layers_of(frame)
     for name in ("id", "normal", "depth"):
         images[name] = images[name].copy()
         images[name][seen] = frame[f"layer_{name}"][seen]
     images["albedo"] = np.where(seen[..., None], layer_texture_of(frame), frame["albedo"])
-    images["roughness"] = np.where(seen, 1, roughness_of(frame))
     images["position"] = frame["position"].astype(float)
     eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
     for y, x in np.argwhere(seen):
@@ -111,7 +109,8 @@ def turn_of(previous: Frame, frame: Frame) -> np.ndarray:
         return v - 2 * (v * n).sum(-1, keepdims=True) * n
 
     d = mirrored(frame, x, n) - mirrored(previous, x_before, n_before)
-    return np.minimum(np.linalg.norm(d, axis=-1) / (2 * roughness_of(frame) + 0.005), 1)
+    width = 2 * np.where(layers_of(frame), 1, roughness_of(frame)) + 0.005  # of diffuse light: all
+    return np.minimum(np.linalg.norm(d, axis=-1) / width, 1)
 
 
 def color_of(frame: Frame, signals: dict[str, np.ndarray]) -> np.ndarray:

@@ -6,8 +6,8 @@ signal is the frame's value minus its reprojected history. Smoothed widely over 
 how the light has changed, with little noise: history takes a share of it, the gain, and alpha of
 what is left (`merging.py`); where it is large against the noise, history is cut short
 (`change.py`). A last filter is for the eye alone and is not fed back (`output.py`).
-All signals go through one pass a level, so that geometry is weighed once; but for glossy light where
-a frame tells of layers (`inputs/layers.py`): it has guides, and so passes, of its own.
+All signals go through one pass a level, so that geometry is weighed once; but for glossy light
+where a frame tells of layers (`inputs/layers.py`): it has guides, and so passes, of its own.
 
 Parameters were found by measurement: see `studies/tune.py`.
 """
@@ -70,7 +70,11 @@ class InnovationState(RecordState[Passes]):
 
 
 class _Given(NamedTuple):
-    """Signals of one surface, and what is known of them; roughness: where there is glossy light."""
+    """Signals of one surface, and what is known of them.
+
+    roughness, lobe: as of `Signals`, where there is glossy light; its image is the sharper the less
+    the former is, its history the longer the more the latter is.
+    """
 
     frame: Frame
     layout: SignalLayout
@@ -80,6 +84,7 @@ class _Given(NamedTuple):
     zero_albedo: Bool | None
     rays: ShadowRays | None
     roughness: Float | None
+    lobe: Float | None
 
 
 @dataclass(frozen=True)
@@ -202,17 +207,18 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         if of_gloss is None or SignalKind.GLOSSY not in layout.kinds:
             output, after = self._filtered(_Given(
                 frame, layout, light.listed, light.chosen, surface, light.texture.zero_albedo, rays,
-                light.roughness), state)
+                light.roughness, light.lobe), state)
             return light.color(output), replace(after, layered=None)
         signals, glossy = list(light.listed), layout.kinds.index(SignalKind.GLOSSY)
         rest, alone = layout.without_gloss()
         (gloss,), layered = self._filtered(_Given(
             of_gloss, alone, [signals.pop(glossy)], None, read_surface(of_gloss, stencil),
-            read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, light.roughness),
+            read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, light.roughness,
+            light.lobe),
             state.layered or InnovationState(stencil, no_history(stencil)))
         output, after = self._filtered(_Given(
-            frame, rest, signals, light.chosen, surface, light.texture.zero_albedo, rays, None),
-            state)
+            frame, rest, signals, light.chosen, surface, light.texture.zero_albedo, rays, None,
+            None), state)
         output.insert(glossy, gloss)
         return light.color(output), replace(after, layered=layered)
 
@@ -231,8 +237,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         passes.layout.check(frame, layout)
         id_ = stencil.Float(sample.id)
         lobes, narrower = None, None
-        if given.roughness is not None:
-            lobes = lobes_between(previous, frame, given.roughness, surface.position, stencil)
+        if given.roughness is not None and given.lobe is not None:
+            lobes = lobes_between(previous, frame, given.lobe, surface.position, stencil)
             narrower = narrowed(given.roughness,
                                 stencil.opaque(min(self.mirror_sigma / self.light_sigma, 1)))
         evaluate(signals, sample, plane, id_, (rays, surface.position) if rays else None, chosen,

@@ -62,9 +62,9 @@ def with_lobes(frame):
 
 
 def with_layers(frame):
-    """The frame with a floor of tiles of two objects that a pane before its left half reflects."""
+    """The frame with a wall of tiles, of two objects, that a pane before its left half shows too."""
     height, width = frame["id"].shape
-    normal, point = np.array([0.1, 0.9, 0.3]), np.array([0, -1.5, 0])
+    normal, point = np.array([0.1, -0.3, -0.9]), np.array([0, 0, 9])
     normal /= np.linalg.norm(normal)
     eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
     y, x = np.mgrid[:height, :width] + 0.5
@@ -75,7 +75,7 @@ def with_layers(frame):
     there = (x < width / 2) & (t > 0)
     depth = np.where(there, t * (on_screen @ frame.screen_from_world[3]) / on_screen[..., 3], 0)
     place = np.where(there[..., None], eye + t[..., None] * ray, 0)
-    tiles = np.floor(3 * place).sum(-1).astype(int) % 2
+    tiles = np.floor(place[..., :2]).sum(-1).astype(int) % 2
     is_pane = (x < width / 2) & (y > height / 5)
     return with_images(
         frame, roughness=np.where(is_pane, 0, frame["roughness"]),
@@ -303,8 +303,9 @@ def test_a_moving_object_and_its_background_keep_histories_of_their_own():
     np.testing.assert_allclose(image, frames[-1]["color"], rtol=2e-2)
 
 
-def test_five_frames_are_one_recording_and_parameters_compile_nothing():
-    frames = split(16, 20, 5)
+@pytest.mark.parametrize("layers", [False, True])
+def test_five_frames_are_one_recording_and_parameters_compile_nothing(layers):
+    frames = split(16, 20, 5, layers=layers)
     run(FilteredInnovation(), frames)
     other = FilteredInnovation(light_alpha=0.1, visibility_sigma=3.0, fade_frames=3.0, penumbra=2.0,
                                sigma_plane=0.02, max_history_length=9.0, plane_tolerance=0.03,
@@ -314,6 +315,11 @@ def test_five_frames_are_one_recording_and_parameters_compile_nothing():
     passes = state.passes
     steps = [passes.follow_shadows, passes.find_innovations, passes.merge, passes.pack,
              *(level.step for level in (passes.spread, *passes.smoothing, *passes.output))]
+    assert (state.layered is not None) == layers
+    if layers:
+        passes = state.layered.passes
+        steps += [passes.find_innovations, passes.merge, passes.pack,
+                  *(level.step for level in (*passes.smoothing, *passes.output))]
     assert [step.recordings for step in steps] == [1] * len(steps)
 
 
