@@ -37,6 +37,7 @@ class Group(Enum):
     SHADOW = "the shadow ray at the first hit"
     GROUPED = "direct light by groups of lights, of scenes that have several"
     GLOSS = "reflections, of scenes that have glossy surfaces"
+    LAYER = "what else is seen, of scenes that have glass or masks"
     REPLAY = "samples of the last frame, shaded again"
     MOTION = "of imports alone, whose motion no matrices tell"
     TRUTH = "of references alone"
@@ -86,7 +87,7 @@ def _rgb(layer: str) -> tuple[str, ...]:
 
 MOST_GROUPS = 4  # of lights, each with a visibility of its own
 SUN = -2  # `light_id` of the environment's brightest spot, where it is a light of its own
-TRACING = 2
+TRACING = 3
 """Counts the changes of what frames hold. Raise it whenever the same scene, frame and seed give
 other values than rounding explains in any channel, of frames or references: sequences and data sets
 begun before are then not continued. One number serves both, since what changes the mean of light
@@ -94,13 +95,15 @@ changes both, and more than one would let a folder hold frames that its referenc
 
 2: the first surface behind mirrors, clear glass and masks is the pixel's (`tracer/replacement.py`);
 under half-open masks mirrors and glass show lamps; the sun of a sky is a light (`lights/sun.py`).
+3: lamps in other layers of glass and masks have no noise (`tracer/layers.py`).
 """
 
 _ROWS = (
     Channel("color", Group.RADIANCE, ("R", "G", "B"), FLOAT, Display.LIGHT, 0.0,
             "radiance, linear Rec. 709; emission + direct + indirect (+ the environment)"),
     Channel("emission", Group.RADIANCE, _rgb("emission"), FLOAT, Display.LIGHT, 0.0,
-            "radiance that the visible surface (or the environment) emits itself"),
+            "radiance that the visible surface (or the environment) emits itself, with that of "
+            "lamps and the environment in other layers of glass and masks; no noise"),
     Channel("direct", Group.RADIANCE, _rgb("direct"), FLOAT, Display.LIGHT, 0.0,
             "light from emitters scattered once, at the first hit; not demodulated"),
     Channel("indirect", Group.RADIANCE, _rgb("indirect"), FLOAT, Display.LIGHT, 0.0,
@@ -151,6 +154,17 @@ _ROWS = (
             "object ID of what the path met next; -1: nothing"),
     Channel("roughness", Group.GLOSS, ("roughness",), HALF, Display.UNIT, 1.0,
             "GGX alpha of the surface's glossy lobe; 0: a mirror or a hole, 1: no such lobe"),
+    Channel("layer_share", Group.LAYER, ("layer.A",), FLOAT, Display.UNIT, 0.0,
+            "share that the brightest other layer has in what glass or a mask shows, by what of "
+            "its light gets here; 0: there is none"),
+    Channel("layer_albedo", Group.LAYER, _rgb("layer.albedo"), HALF, Display.LIGHT, 0.0,
+            "`albedo` of that layer's surface, less what takes of its light on the way"),
+    Channel("layer_normal", Group.LAYER, ("layer.N.X", "layer.N.Y", "layer.N.Z"), FLOAT,
+            Display.AXES, 0.0, "its `normal`, of the image"),
+    Channel("layer_depth", Group.LAYER, ("layer.Z",), EXACT, Display.RANGE, 0.0,
+            "its `depth`, of the image; 0: none, or nothing there"),
+    Channel("layer_id", Group.LAYER, ("layer.ID",), OBJECT_ID, Display.OBJECT, -1.0,
+            "its `id`, of the image; -1: none, or nothing there"),
     Channel("replay", Group.REPLAY, ("replay.direct", "replay.indirect"), FLOAT, Display.UNIT, -1.0,
             "luminance of some samples of the frame one number before (in the sequence or not), "
             "shaded again here; -1: no sample"),
@@ -185,8 +199,9 @@ def channels_of(*groups: Group) -> tuple[str, ...]:
     return tuple(row.name for group in groups for row in _ROWS if row.group is group)
 
 
-RADIANCE, SPLIT, SHADOW, GROUPED, GLOSS, REPLAY = (channels_of(group) for group in (
-    Group.RADIANCE, Group.SPLIT, Group.SHADOW, Group.GROUPED, Group.GLOSS, Group.REPLAY))
+RADIANCE, SPLIT, SHADOW, GROUPED, GLOSS, LAYER, REPLAY = (channels_of(group) for group in (
+    Group.RADIANCE, Group.SPLIT, Group.SHADOW, Group.GROUPED, Group.GLOSS, Group.LAYER,
+    Group.REPLAY))
 UNSHADOWED = tuple(name for name in GROUPED if name.startswith("unshadowed"))
 FRAME = channels_of(Group.RADIANCE, Group.GUIDES)
 """What can be said of every scene."""

@@ -27,7 +27,7 @@ A frame that lacks the split has D in L; one without direct light, its colour.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
@@ -42,9 +42,11 @@ from onespp.render.channels import GROUPED, UNSHADOWED
 from onespp.render.frame import Frame
 
 from .demodulation import Texture, read_texture
+from .layers import LAYERS
 from .repair import repair
 
-USED = ("direct", "indirect", "unshadowed", "visibility", "specular", "roughness", *GROUPED)
+USED = ("direct", "indirect", "unshadowed", "visibility", "specular", "roughness",
+        *LAYERS, *GROUPED)
 LARGEST_VISIBILITY = 2.0
 
 
@@ -84,6 +86,8 @@ class Signals:
             group's visibility is y, 0 where the ray went to another group.
         unshadowed: what each V is a share of. texture: albedo and emission.
         chosen: None where all lights are one. roughness: where G is apart and its lobes are known.
+        lobe: the same, but 1 where G is the (diffuse) light of a layer. of_gloss: texture of G,
+            where that is known (`layers.py`).
     """
 
     kinds: tuple[SignalKind, ...]
@@ -92,6 +96,8 @@ class Signals:
     texture: Texture
     chosen: Chosen | None = None
     roughness: Float | None = None
+    lobe: Float | None = None
+    of_gloss: Texture = field(default_factory=Texture)
 
     @property
     def groups(self) -> int:
@@ -104,19 +110,20 @@ class Signals:
         unshadowed = iter(self.unshadowed)
         for kind, signal in zip(self.kinds[1:], signals[1:], strict=True):
             if kind is SignalKind.GLOSSY:
-                color = Color(*[c + g for c, g in zip(color, _color(signal))])
+                gloss = self.of_gloss.modulate(_color(signal))
+                color = Color(*[c + g for c, g in zip(color, gloss)])
             else:
                 color = _with(color, signal.luminance, next(unshadowed))
         return color
 
 
 def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
-                 gloss: bool) -> Signals:
+                 gloss: bool, of_gloss: Frame | None = None) -> Signals:
     """The signals of a frame; `color` is used where it has no direct and indirect light.
 
     Args:
         demodulate: divide by the albedo, where the frame has it.
-        gloss: G as a signal of its own, where the frame has it.
+        gloss: G as a signal of its own, where the frame has it. of_gloss: of `surface_of_gloss`.
     """
     texture = read_texture(frame, stencil, demodulate)
     if "direct" not in frame or "indirect" not in frame:
@@ -131,11 +138,20 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
         texture = Texture(texture.albedo, Color(*load("emission")), texture.zero_albedo)
     light = Color(*[d + i for d, i in zip(load("direct"), load("indirect"))])
     kinds, apart, unshadowed, chosen, roughness = [SignalKind.DIFFUSE], [], [], None, None
+    texture_of_gloss, lobe = Texture(), None
     if gloss and "specular" in frame:
         specular = Color(*load("specular"))
         light = Color(*[c - g for c, g in zip(light, specular)])
         if "roughness" in frame:
-            (roughness,) = load("roughness")
+            lobe = roughness = load("roughness")[0]
+        if of_gloss is not None:
+            is_layer = (of_gloss["roughness"] == 1) & (frame["roughness"] == 0)
+            (there,) = stencil.load(is_layer.astype(np.float32))
+            lobe = dr.select(there > 0, stencil.Float(1), roughness)
+            if demodulate:
+                albedo = np.where(is_layer[..., None], of_gloss["albedo"], np.float32(1))
+                texture_of_gloss = Texture(Color(*stencil.load(albedo)))
+                specular = texture_of_gloss.demodulate(specular)
         kinds.append(SignalKind.GLOSSY)
         apart.append(_of_light(specular))
     if "unshadowed" in frame and "visibility" in frame:
@@ -154,14 +170,15 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
             light = _with(light, -v, u)
         kinds += [SignalKind.VISIBILITY] * len(visibility)
         apart += [Signal(None, v, None) for v in visibility]
-    if roughness is not None and texture.albedo:
+    if lobe is not None and texture.albedo:
         white = [a >= 1 for a in texture.albedo]
-        is_bare = (roughness < 1) & white[0] & white[1] & white[2]
+        is_bare = (lobe < 1) & white[0] & white[1] & white[2]
         more = _of_light(Color(*[dr.select(is_bare, c, 0) for c in light]))
         apart[0] = Signal(*[g + m for g, m in zip(apart[0], more)])
         light = Color(*[dr.select(is_bare, 0, c) for c in light])
     diffuse = _of_light(Texture(texture.albedo).demodulate(light))
-    return Signals(tuple(kinds), [diffuse, *apart], unshadowed, texture, chosen, roughness)
+    return Signals(tuple(kinds), [diffuse, *apart], unshadowed, texture, chosen, roughness,
+                   lobe, texture_of_gloss)
 
 
 def _capped(visibility: Float) -> Float:

@@ -35,6 +35,7 @@ def unshadowed_of(frame: Frame) -> dict[str, np.ndarray]:
 def signals_of(frame: Frame) -> dict[str, np.ndarray]:
     """L, G and V, (h, w, c), then y of each group."""
     light = frame["direct"].astype(float) + frame["indirect"] - frame["specular"]
+    specular = frame["specular"].astype(float)
     unshadowed = unshadowed_of(frame)
     told, chance = {"V": np.minimum(frame["visibility"].astype(float), 2)[..., None]}, 1.0
     if "group" in frame:
@@ -46,14 +47,50 @@ def signals_of(frame: Frame) -> dict[str, np.ndarray]:
         light = light - v / chance * unshadowed[name]
     mirrored = np.zeros_like(light)
     if "roughness" in frame:  # where nothing is diffuse, all that is left is G
-        bare = (texture_of(frame) >= 1).all(-1) & (roughness_of(frame) < 1)
+        bare = (texture_of(frame) >= 1).all(-1) & (roughness_of(frame) < 1) & ~layers_of(frame)
         mirrored = np.where(bare[..., None], light, 0)
     return {"L": (light - mirrored) / texture_of(frame),
-            "G": frame["specular"] + mirrored, **told}
+            "G": specular / layer_texture_of(frame) + mirrored, **told}
 
 
 def roughness_of(frame: Frame) -> np.ndarray:
     return frame["roughness"].astype(float).reshape(frame["id"].shape)
+
+
+def layers_of(frame: Frame) -> np.ndarray:
+    """Where glossy light is that of another layer."""
+    if "layer_share" not in frame:
+        return np.zeros(frame["id"].shape, bool)
+    return (frame["layer_share"] > 0) & (roughness_of(frame) == 0)
+
+
+def layer_texture_of(frame: Frame) -> np.ndarray:
+    """(h, w, 3) what glossy light is divided by."""
+    texture = np.ones((*frame["id"].shape, 3))
+    seen = layers_of(frame)
+    if seen.any():
+        seen &= frame["layer_id"] >= 0
+        texture[seen] = np.clip(frame["layer_albedo"][seen].astype(float)
+                                / frame["layer_share"][seen][:, None], 0.25, 1)
+    return texture
+
+
+def seen_in_gloss(frame: Frame) -> Frame:
+    """The frame with the surfaces that glossy light is from."""
+    images, seen = dict(frame.images), layers_of(frame)
+    for name in ("id", "normal", "depth"):
+        images[name] = images[name].copy()
+        images[name][seen] = frame[f"layer_{name}"][seen]
+    images["albedo"] = np.where(seen[..., None], layer_texture_of(frame), frame["albedo"])
+    images["position"] = frame["position"].astype(float)
+    eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
+    for y, x in np.argwhere(seen):
+        on_screen = np.linalg.inv(frame.screen_from_world) @ [x + 0.5, y + 0.5, 1, 1]
+        point = on_screen / on_screen[3]
+        images["position"][y, x] = eye + (point[:3] - eye) * (
+            images["depth"][y, x] / (frame.screen_from_world[3] @ point))
+    return Frame(frame.index, images, frame.camera_from_world, frame.screen_from_world,
+                 frame.world_from_object)
 
 
 def turn_of(previous: Frame, frame: Frame) -> np.ndarray:
@@ -72,12 +109,14 @@ def turn_of(previous: Frame, frame: Frame) -> np.ndarray:
         return v - 2 * (v * n).sum(-1, keepdims=True) * n
 
     d = mirrored(frame, x, n) - mirrored(previous, x_before, n_before)
-    return np.minimum(np.linalg.norm(d, axis=-1) / (2 * roughness_of(frame) + 0.005), 1)
+    width = 2 * np.where(layers_of(frame), 1, roughness_of(frame)) + 0.005  # of diffuse light: all
+    return np.minimum(np.linalg.norm(d, axis=-1) / width, 1)
 
 
 def color_of(frame: Frame, signals: dict[str, np.ndarray]) -> np.ndarray:
     direct = sum(signals[name] * u for name, u in unshadowed_of(frame).items())
-    return frame["emission"] + direct + texture_of(frame) * signals["L"] + signals["G"]
+    return (frame["emission"] + direct + texture_of(frame) * signals["L"]
+            + layer_texture_of(frame) * signals["G"])
 
 
 def kind_of(frame: Frame) -> np.ndarray:
@@ -316,6 +355,17 @@ def narrowness(frame: Frame, told: np.ndarray, m) -> np.ndarray:
 
 def run(frames: list[Frame], m) -> np.ndarray:
     """The colour of the last frame."""
+    signals = [signals_of(frame) for frame in frames]
+    gloss = {}
+    if "layer_share" in frames[0]:
+        gloss = filtered([seen_in_gloss(frame) for frame in frames],
+                         [{"G": each.pop("G")} for each in signals], m)
+    out = filtered(frames, signals, m) | gloss
+    return repaid(color_of(frames[-1], out), frames[-1]["id"])
+
+
+def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict[str, np.ndarray]:
+    """Signals of the last frame."""
     sharp_levels = m.sharp_innovation_levels, m.sharp_output_levels
     settings = {
         "L": (m.light_alpha, m.innovation_levels, m.output_levels, m.light_sigma, m.light_change),
@@ -325,9 +375,8 @@ def run(frames: list[Frame], m) -> np.ndarray:
     energy = np.zeros(0)
     lengths: dict[str, np.ndarray] = {}  # by what has one, see `length_of`
     previous, out = None, {}
-    for frame in frames:
+    for frame, signals in zip(frames, given, strict=True):
         found = np.zeros(frame["id"].shape, bool)
-        signals = signals_of(frame)
         ns = {length_of(frame, name): np.ones(found.shape) for name in signals}
         if previous is not None:
             for key, length in lengths.items():
@@ -432,7 +481,7 @@ def run(frames: list[Frame], m) -> np.ndarray:
                 history = np.where(samples[..., None] > 1e-5, history, out[name])
             kept[name] = history, s2, np.minimum(samples, 64)
         lengths, previous = ns, frame
-    return repaid(color_of(frames[-1], out), frames[-1]["id"])
+    return out
 
 
 def length_of(frame: Frame, name: str) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 
 from onespp.datasets.folder import DataSet
 from onespp.datasets.plan import SPLITS, Plan
-from onespp.render.channels import CHANNELS, REPLAY, Group, channels_of
+from onespp.render.channels import CHANNELS, LAYER, REPLAY, Group, channels_of
 from onespp.render.errors import InputError
 from onespp.render.files.sequence import FrameSequence
 
@@ -28,7 +28,7 @@ from .view import Turn, seen_through
 MOTION = "motion"
 _LIGHT = (*channels_of(Group.RADIANCE), "specular",
           *(name for name in CHANNELS if name.startswith("unshadowed")))
-_WITHOUT_NOISE = (*channels_of(Group.GUIDES), "roughness", MOTION)
+_WITHOUT_NOISE = (*channels_of(Group.GUIDES), "roughness", MOTION, *LAYER)
 _EVERY = 4  # pixels by which the mean motion of a crop is found
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from .motion import Matrices
 
-DIRECTIONS, POINTS, ON_SCREEN = ("normal", "light"), ("position",), ("motion",)
+DIRECTIONS, POINTS, ON_SCREEN = ("normal", "light", "layer_normal"), ("position",), ("motion",)
 """Channels of vectors in the world, of places in it, and of vectors in pixels."""
 
 

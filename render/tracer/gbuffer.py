@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 
@@ -82,6 +83,21 @@ def roughness(hit: PrimaryHit) -> mi.Float:
     return dr.select((value == 1) & is_image, 0, value)
 
 
+def layer_share(hit: PrimaryHit) -> mi.Float:
+    assert hit.behind is not None
+    return hit.behind.layer_share
+
+
+def _of_layer(guide: Callable[[PrimaryHit], Any]) -> Callable[[PrimaryHit], Any]:
+    """The same guide of what the brightest layer left aside comes to."""
+    def of_layer(hit: PrimaryHit) -> Any:
+        assert hit.behind is not None
+        layer = hit.behind.layer
+        return guide(PrimaryHit(hit.stage, hit.ray, layer.pi.compute_surface_interaction(layer.ray),
+                                hit.depth_per_length, layer))
+    return of_layer
+
+
 GBUFFER: dict[str, Callable[[PrimaryHit], mi.Float | mi.Vector3f | mi.Color3f | mi.Int32]] = {
     "albedo": albedo,
     "normal": normal,
@@ -89,4 +105,9 @@ GBUFFER: dict[str, Callable[[PrimaryHit], mi.Float | mi.Vector3f | mi.Color3f | 
     "depth": depth,
     "id": object_id,
     "roughness": roughness,
+    "layer_share": layer_share,
+    "layer_albedo": _of_layer(albedo),
+    "layer_normal": _of_layer(normal),
+    "layer_depth": _of_layer(depth),
+    "layer_id": _of_layer(object_id),
 }

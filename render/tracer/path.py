@@ -21,6 +21,7 @@ import drjit as dr
 
 from onespp.render.mitsuba.variant import mi
 
+from .layers import is_straight
 from .lights.candidates import sought_light
 from .lights.resampling import DirectLight, Lights, power_heuristic, resample_lights, shape_index
 from .replacement import Layer, Replaced
@@ -39,6 +40,7 @@ class Radiance:
     specular: the part of `indirect` that left the first hit through a glossy or mirror lobe.
     hit_distance: from the first hit to the next, 0 if there is none. hit_shape: the shape met
     there, its index in the JIT registry, 0 if there is none; hit_face: which of its faces.
+    straight: the part of all of it that straight paths found (`layers.py`), if that was asked for.
     `unshadowed`, `visibility` and `shadow_ray` are there if direct light was resampled: see
     `render/tracer/lights/resampling.py`.
     """
@@ -53,12 +55,13 @@ class Radiance:
     unshadowed: mi.Color3f | None = None
     visibility: mi.Float | None = None
     shadow_ray: DirectLight | None = None
+    straight: mi.Color3f | None = None
 
 
 @dr.syntax
 def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
           max_depth: int, candidates: int = 1, lights: Lights | None = None,
-          behind: Replaced | Layer | None = None) -> Radiance:
+          behind: Replaced | Layer | None = None, tell_straight: bool = False) -> Radiance:
     """One path a lane.
 
     Args:
@@ -67,7 +70,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         max_depth: longest path in segments, as in Mitsuba (1: emission, 2: direct light).
         candidates: points of the lights that a vertex compares before it sends its shadow ray.
         lights: those that direct light at the first hit is resampled from; None: it is by MIS too.
-        behind: what `ray` and `pi` are behind, if anything.
+        behind: what `ray` and `pi` are behind, if anything. tell_straight: see `Radiance.straight`.
     """
     context = mi.BSDFContext()
     ray = mi.Ray3f(ray)
@@ -75,6 +78,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     emission, direct, indirect = mi.Color3f(0), mi.Color3f(0), mi.Color3f(0)
     specular, through_gloss = mi.Color3f(0), mi.Bool(False)
     hit_distance, hit_shape, hit_face = mi.Float(0), mi.UInt32(0), mi.UInt32(0)
+    straight, stays_straight = mi.Color3f(0), mi.Bool(True)
     arrived = mi.Color3f(0)  # direct light, but for what purely specular lobes reflect
     beta, eta = mi.Color3f(1), mi.Float(1)
     depth, longest, opacity = mi.UInt32(0), max_depth, None
@@ -133,6 +137,10 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         from_delta = mi.has_flag(bsdf_sample.sampled_type, mi.BSDFFlags.Delta)
         through_gloss |= (depth == 0) & (from_delta | mi.has_flag(bsdf_sample.sampled_type,
                                                                   mi.BSDFFlags.Glossy))
+        if dr.hint(tell_straight, mode="scalar"):
+            straight += dr.select(stays_straight, found, 0)
+            stays_straight &= is_straight(bsdf_sample, 1.0 if opacity is None else
+                                          dr.select(depth == 0, opacity, 1))
         previous_p = mi.Point3f(si.p)
         active = inner & (dr.max(beta) > 0)
         depth += 1
@@ -146,7 +154,8 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         hit_shape = dr.select(met, shape_index(pi.shape, met), hit_shape)
         hit_face = dr.select(met, pi.prim_index, hit_face)
 
-    radiance = Radiance(emission, direct, indirect, specular, hit_distance, hit_shape, hit_face)
+    radiance = Radiance(emission, direct, indirect, specular, hit_distance, hit_shape, hit_face,
+                        straight=straight if tell_straight else None)
     return _with_split(radiance, arrived, split)
 
 

@@ -13,6 +13,7 @@ from onespp.render.channels import (
     FRAME,
     GLOSS,
     GROUPED,
+    LAYER,
     RADIANCE,
     REPLAY,
     SHADOW,
@@ -29,7 +30,7 @@ from .camera_rays import camera_matrices
 from .gbuffer import GBUFFER, PrimaryHit
 from .lights.candidates import candidates_for
 from .path import Radiance, sum_of_samples, trace
-from .replacement import Layer, replaced
+from .replacement import Replaced, replaced
 from .replay import replay
 from .sampler import FRAME_STREAM, REFERENCE_STREAM, Sampler, Sobol, keys_from_seed
 from .view import View
@@ -45,7 +46,8 @@ class Renderer(View):
     def channels(self) -> tuple[str, ...]:
         """All channels of its frames that are not the same in any scene of this kind."""
         return (FRAME + (SPLIT + SHADOW if self.splits else ()) + self._grouped
-                + (GLOSS if self.stage.glossy else ()))
+                + (GLOSS if self.stage.glossy else ())
+                + (LAYER if self.stage.images.layered else ()))
 
     @property
     def _grouped(self) -> tuple[str, ...]:
@@ -67,6 +69,10 @@ class Renderer(View):
         if lacking := [c for c in channels if c in GROUPED and c not in self._grouped]:
             raise InputError(f"the channels {', '.join(lacking)} need --direct resampled and a "
                              f"scene of more lights than '{self.scene.name}' has")
+        if set(channels) & {*LAYER} and not self.stage.images.layered:
+            raise InputError(f"the channels {', '.join(c for c in LAYER if c in channels)} need a "
+                             "scene with clear glass or masks, which "
+                             f"'{self.scene.name}' is not: leave them out")
         before = index - 1 if index > 0 else None
         replayed = replay(self, index, before, seed) if set(channels) & set(REPLAY) else {}
         if set(channels) & _TRACED:
@@ -117,7 +123,7 @@ class Renderer(View):
                 radiance = trace(scene, seen, pi, sampler, self.scene.max_depth,
                                  self.candidates, self.lights, behind)
                 if behind and behind.other:
-                    radiance = self._with_other(radiance, behind.other, sampler)
+                    radiance = self._with_layers(radiance, behind, sampler)
                 unit = dr.opaque(mi.Float, self.stage.unit)
                 planes = {
                     "color": radiance.emission + radiance.direct + radiance.indirect,
@@ -153,16 +159,20 @@ class Renderer(View):
                 planes |= {name: GBUFFER[name](hit) for name in channels if name in GBUFFER}
             return {name: planes[name] for name in channels}
 
-    def _with_other(self, radiance: Radiance, layer: Layer, sampler: Sampler) -> Radiance:
-        """Light with that of another layer, which is specular."""
-        scene = self.stage.mi_scene
+    def _with_layers(self, radiance: Radiance, behind: Replaced, sampler: Sampler) -> Radiance:
+        """Light with that of other layers: their lamps, and of one of them the rest, specular."""
+        scene, layer, aside = self.stage.mi_scene, behind.other, behind.aside
+        assert layer is not None
+        assert aside is not None
         pi = scene.ray_intersect_preliminary(layer.ray, coherent=False,
                                              active=dr.max(layer.throughput) > 0)
         other = trace(scene, layer.ray, pi, sampler, self.scene.max_depth, self.candidates,
-                      behind=layer)
-        light = other.emission + other.direct + other.indirect
-        return replace(radiance, indirect=radiance.indirect + light,
-                       specular=radiance.specular + light)
+                      behind=layer, tell_straight=True)
+        assert other.straight is not None
+        light = other.emission + other.direct + other.indirect - other.straight
+        light = dr.maximum(light, 0)  # (rounding)
+        return replace(radiance, emission=radiance.emission + aside.lamps,
+                       indirect=radiance.indirect + light, specular=radiance.specular + light)
 
     @dr.syntax
     def _trace_samples(self, index: int, seed: int, part: int, start: int, count: int,

@@ -101,7 +101,7 @@ class SignalLayout:
     """Which signals there are, and how many levels each goes through.
 
     Attributes:
-        kinds: of signals, diffuse light first and visibility last.
+        kinds: of signals, diffuse light first and visibility last; or glossy light alone.
         groups: of lights, whose sparse signals are the last; 0: all lights are one.
         has_shadow_rays: visibility has a second history, and penumbras are known.
         innovation_levels, output_levels: of diffuse light, in the smoothing of the innovation and
@@ -124,6 +124,13 @@ class SignalLayout:
         if self != now:
             raise InputError(f"frame {frame.index} has other channels than the frame before it: "
                              "render the sequence anew with one set of --channels")
+
+    def without_gloss(self) -> tuple[SignalLayout, SignalLayout]:
+        """Of the other signals, and of glossy light alone."""
+        rest = tuple(kind for kind in self.kinds if kind is not SignalKind.GLOSSY)
+        return replace(self, kinds=rest), replace(
+            self, kinds=(SignalKind.GLOSSY,), groups=0, has_shadow_rays=False,
+            innovation_levels=self.sharp_innovation_levels, output_levels=self.sharp_output_levels)
 
     def each(self, light: T, visibility: T) -> list[T]:
         """A parameter of each signal."""
@@ -157,7 +164,7 @@ class SignalLayout:
         light = Signal(*[rule(sharp)] * 3)
         visible = [rule(sharp, penumbra=self.follower(s)) for s in self.visibilities]
         chosen = visible if self.has_shadow_rays and not self.groups else []
-        glossy = [light] * self.kinds.count(SignalKind.GLOSSY)
+        glossy = [light] * self.kinds[1:].count(SignalKind.GLOSSY)
         return _leaves(Smoothed(
             diffuse_spread=rule(diffuse, squared=True),
             diffuse=Signal(*[rule(diffuse)] * 3),

@@ -6,7 +6,8 @@ signal is the frame's value minus its reprojected history. Smoothed widely over 
 how the light has changed, with little noise: history takes a share of it, the gain, and alpha of
 what is left (`merging.py`); where it is large against the noise, history is cut short
 (`change.py`). A last filter is for the eye alone and is not fed back (`output.py`).
-All signals go through one pass a level, so that geometry is weighed once.
+All signals go through one pass a level, so that geometry is weighed once; but for glossy light
+where a frame tells of layers (`inputs/layers.py`): it has guides, and so passes, of its own.
 
 Parameters were found by measurement: see `studies/tune.py`.
 """
@@ -16,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import drjit as dr
 
@@ -25,9 +26,18 @@ from onespp.denoise.history.records import RecordState, no_history
 from onespp.denoise.history.reflections import lobes_between
 from onespp.denoise.history.reprojection import ReprojectionTests, motion_between, without_images
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
-from onespp.denoise.inputs.shadow_rays import has_shadow_rays, read_shadow_rays
-from onespp.denoise.inputs.signals import USED, SignalKind, Signals, read_signals
-from onespp.denoise.inputs.surface import Surface, TangentPlane
+from onespp.denoise.inputs.demodulation import read_texture
+from onespp.denoise.inputs.layers import surface_of_gloss
+from onespp.denoise.inputs.shadow_rays import ShadowRays, has_shadow_rays, read_shadow_rays
+from onespp.denoise.inputs.signals import (
+    USED,
+    Chosen,
+    Signal,
+    SignalKind,
+    Signals,
+    read_signals,
+)
+from onespp.denoise.inputs.surface import Surface, TangentPlane, read_surface
 from onespp.denoise.jit.arrays import Bool, Color, Float
 from onespp.denoise.jit.fastmath import LOG2E
 from onespp.denoise.jit.grid import Stencil
@@ -50,6 +60,31 @@ from .texture import LEVELS, at_rest_between
 
 _LAMP = 2 * BACKGROUND    # 1/z where albedo is 0: far from any plane, and from background
 _BACKGROUND_SCALE = 1e3   # |k| / sigma_plane of background and lamps: only their like counts
+
+
+@dataclass(frozen=True)
+class InnovationState(RecordState[Passes]):
+    """`RecordState`, and that of glossy light where it is of other layers."""
+
+    layered: InnovationState | None = None
+
+
+class _Given(NamedTuple):
+    """Signals of one surface, and what is known of them.
+
+    roughness, lobe: as of `Signals`, where there is glossy light; its image is the sharper the less
+    the former is, its history the longer the more the latter is.
+    """
+
+    frame: Frame
+    layout: SignalLayout
+    signals: list[Signal]
+    chosen: Chosen | None
+    surface: Surface
+    zero_albedo: Bool | None
+    rays: ShadowRays | None
+    roughness: Float | None
+    lobe: Float | None
 
 
 @dataclass(frozen=True)
@@ -155,31 +190,56 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     def reach(self) -> int:
         return 1 << max(self.innovation_levels - 1, self.output_levels - 1, SPREAD_LEVEL)
 
-    def init_on(self, stencil: Stencil) -> RecordState[Passes]:
-        return RecordState(stencil, no_history(stencil))
+    def init_on(self, stencil: Stencil) -> InnovationState:
+        return InnovationState(stencil, no_history(stencil))
 
     def on_lanes(self, frame: Frame, color: Color, surface: Surface,
                  state: RecordState[Passes]) -> tuple[Color, RecordState[Passes]]:
         """`color` is used where the frame has no direct and indirect light."""
-        stencil, previous, sample = state.stencil, state.previous or frame, surface.sample
-        motion = motion_between(previous, frame, stencil)
-        light = read_signals(frame, color, stencil, self.demodulate, self.gloss)
-        signals = light.listed
-        plane = self._tangent_plane(surface, light.texture.zero_albedo, stencil)
+        assert isinstance(state, InnovationState)
+        stencil, previous = state.stencil, state.previous or frame
+        of_gloss = surface_of_gloss(frame) if self.gloss else None
+        light = read_signals(frame, color, stencil, self.demodulate, self.gloss, of_gloss)
         rays = None
         if self.follow_shadows and light.unshadowed and has_shadow_rays(frame):
             rays = read_shadow_rays(frame, previous, stencil)
         layout = self._layout(light, rays is not None)
+        if of_gloss is None or SignalKind.GLOSSY not in layout.kinds:
+            output, after = self._filtered(_Given(
+                frame, layout, light.listed, light.chosen, surface, light.texture.zero_albedo, rays,
+                light.roughness, light.lobe), state)
+            return light.color(output), replace(after, layered=None)
+        signals, glossy = list(light.listed), layout.kinds.index(SignalKind.GLOSSY)
+        rest, alone = layout.without_gloss()
+        (gloss,), layered = self._filtered(_Given(
+            of_gloss, alone, [signals.pop(glossy)], None, read_surface(of_gloss, stencil),
+            read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, light.roughness,
+            light.lobe),
+            state.layered or InnovationState(stencil, no_history(stencil)))
+        output, after = self._filtered(_Given(
+            frame, rest, signals, light.chosen, surface, light.texture.zero_albedo, rays, None,
+            None), state)
+        output.insert(glossy, gloss)
+        return light.color(output), replace(after, layered=layered)
+
+    def _filtered(self, given: _Given, state: InnovationState,
+                  ) -> tuple[list[Signal], InnovationState]:
+        """Signals that have one surface, filtered."""
+        frame, signals, surface, chosen = given.frame, given.signals, given.surface, given.chosen
+        stencil, previous, sample = state.stencil, state.previous or frame, surface.sample
+        layout, rays = given.layout, given.rays
+        motion = motion_between(previous, frame, stencil)
+        plane = self._tangent_plane(surface, given.zero_albedo, stencil)
         passes, records = state.passes, state.records
         if passes is None:
             passes = Passes.make(stencil, layout)
             records = no_history(stencil, layout.record_values)
         passes.layout.check(frame, layout)
-        id_, chosen = stencil.Float(sample.id), light.chosen
+        id_ = stencil.Float(sample.id)
         lobes, narrower = None, None
-        if light.roughness is not None:
-            lobes = lobes_between(previous, frame, light.roughness, surface.position, stencil)
-            narrower = narrowed(light.roughness,
+        if given.roughness is not None and given.lobe is not None:
+            lobes = lobes_between(previous, frame, given.lobe, surface.position, stencil)
+            narrower = narrowed(given.roughness,
                                 stencil.opaque(min(self.mirror_sigma / self.light_sigma, 1)))
         evaluate(signals, sample, plane, id_, (rays, surface.position) if rays else None, chosen,
                  lobes, narrower)
@@ -198,8 +258,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
                                       narrower)
         records = passes.pack(sample, History(merged.lengths, merged.signals),
                               output if layout.groups else None)
-        return light.color(output), replace(state, passes=passes, records=records,
-                                            previous=without_images(frame))
+        return output, replace(state, passes=passes, records=records,
+                               previous=without_images(frame))
 
     def _layout(self, light: Signals, has_shadow_rays: bool) -> SignalLayout:
         has_texture = light.texture.albedo is None and len(light.kinds) == 1

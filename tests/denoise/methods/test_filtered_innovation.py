@@ -61,8 +61,33 @@ def with_lobes(frame):
                        albedo=np.where(bare, 1, frame["albedo"]))
 
 
-def split(height, width, count=3, lobes=True):
-    """Moving frames with all channels that the method uses, a lamp, and three objects."""
+def with_layers(frame):
+    """The frame with a wall of tiles, of two objects, that a pane before its left half shows too."""
+    height, width = frame["id"].shape
+    normal, point = np.array([0.1, -0.3, -0.9]), np.array([0, 0, 9])
+    normal /= np.linalg.norm(normal)
+    eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
+    y, x = np.mgrid[:height, :width] + 0.5
+    on_screen = np.stack([x, y, 0 * x + 1, 0 * x + 1], -1) @ np.linalg.inv(
+        frame.screen_from_world).T
+    ray = on_screen[..., :3] / on_screen[..., 3:] - eye
+    t = normal @ (point - eye) / (ray @ normal)
+    there = (x < width / 2) & (t > 0)
+    depth = np.where(there, t * (on_screen @ frame.screen_from_world[3]) / on_screen[..., 3], 0)
+    place = np.where(there[..., None], eye + t[..., None] * ray, 0)
+    tiles = np.floor(place[..., :2]).sum(-1).astype(int) % 2
+    is_pane = (x < width / 2) & (y > height / 5)
+    return with_images(
+        frame, roughness=np.where(is_pane, 0, frame["roughness"]),
+        layer_share=np.where(is_pane, 0.1 + 0.1 * y / height, 0),
+        layer_albedo=np.where(is_pane & there, 0.02 + 0.1 * tiles, 0)[..., None] * [1, 0.8, 0.3],
+        layer_normal=np.where(there[..., None], normal, 0), layer_depth=depth,
+        layer_id=np.where(there, 2 * tiles, -1))
+
+
+def split(height, width, count=3, lobes=True, layers=False):
+    """Moving frames with all channels that the method uses, but for those of layers unless asked
+    for, a lamp, and three objects."""
     frames = []
     for i, frame in enumerate(moving(height, width, count)):
         rng = np.random.default_rng(100 + i)
@@ -77,6 +102,7 @@ def split(height, width, count=3, lobes=True):
         frame = with_images(frame, albedo=albedo, unshadowed=unshadowed, color=color,
                             visibility=visibility, direct=direct, specular=specular)
         frame = with_lobes(frame) if lobes else frame
+        frame = with_layers(frame) if layers else frame
         frames.append(with_neighbour(with_shadow_rays(frame, i)))
     return frames
 
@@ -85,7 +111,7 @@ def split(height, width, count=3, lobes=True):
 @pytest.mark.parametrize(("height", "width", "levels", "sharp_levels"), [
     (19, 26, 4, 2), (7, 5, 4, 2), (1, 9, 4, 2), (9, 70, 7, 6), (12, 9, 6, 3)])
 def test_it_is_the_formula_in_float64(height, width, levels, sharp_levels, shadows):
-    frames = split(height, width, lobes=shadows)
+    frames = split(height, width, lobes=shadows, layers=shadows and height > 9)
     method = FilteredInnovation(
         innovation_levels=levels, output_levels=3, sharp_innovation_levels=sharp_levels,
         sharp_output_levels=2, follow_shadows=shadows)
@@ -277,8 +303,9 @@ def test_a_moving_object_and_its_background_keep_histories_of_their_own():
     np.testing.assert_allclose(image, frames[-1]["color"], rtol=2e-2)
 
 
-def test_five_frames_are_one_recording_and_parameters_compile_nothing():
-    frames = split(16, 20, 5)
+@pytest.mark.parametrize("layers", [False, True])
+def test_five_frames_are_one_recording_and_parameters_compile_nothing(layers):
+    frames = split(16, 20, 5, layers=layers)
     run(FilteredInnovation(), frames)
     other = FilteredInnovation(light_alpha=0.1, visibility_sigma=3.0, fade_frames=3.0, penumbra=2.0,
                                sigma_plane=0.02, max_history_length=9.0, plane_tolerance=0.03,
@@ -288,6 +315,11 @@ def test_five_frames_are_one_recording_and_parameters_compile_nothing():
     passes = state.passes
     steps = [passes.follow_shadows, passes.find_innovations, passes.merge, passes.pack,
              *(level.step for level in (passes.spread, *passes.smoothing, *passes.output))]
+    assert (state.layered is not None) == layers
+    if layers:
+        passes = state.layered.passes
+        steps += [passes.find_innovations, passes.merge, passes.pack,
+                  *(level.step for level in (*passes.smoothing, *passes.output))]
     assert [step.recordings for step in steps] == [1] * len(steps)
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onespp.render.channels import FRAME, GLOSS
+from onespp.render.channels import FRAME, GLOSS, LAYER
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Disk, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.hard import HARD
@@ -219,11 +219,11 @@ def test_half_open_masks_under_an_even_sky_are_as_bright_as_in_closed_form():
     assert_same_mean(*mean_and_variance([blocks(image, 4) for image in ours]), expected)
 
 
-def test_what_glass_reflects_is_specular_light_of_its_own():
+def test_what_glass_reflects_of_the_lamp_is_emission_beside_light_of_its_own():
     frame, _ = seen(Shape("sheet", Rectangle(), pane(), translate((0, 1, 1.5)) @ rotate(X, -50)))
     both = (frame["roughness"] == 0) & (frame["id"] >= 0)
     assert both.sum() > 50
-    assert frame["specular"][both].mean() > 0
+    assert frame["emission"][both].mean() > 0
     assert np.all(frame["specular"] <= frame["indirect"] + 1e-6)
 
 
@@ -273,11 +273,11 @@ def test_blends_with_glass_are_met_by_chance():
     assert not Renderer(scene, 8, 8).stage.images.any
 
 
-def test_channels_of_gloss_come_with_glass_and_not_with_mirrors():
+def test_channels_of_gloss_and_layers_come_with_glass_and_not_with_mirrors():
     shapes = {"mirror": mirror(), "glass": glass()}
     found = {}
     for name, material in shapes.items():
         scene = Scene("seen", "for a test", (FLOOR, LAMP, Shape("it", Sphere(), material)), CAMERA,
                       1, W, H)
         found[name] = Renderer(scene, 8, 8).channels
-    assert found == {"mirror": FRAME, "glass": FRAME + GLOSS}
+    assert found == {"mirror": FRAME, "glass": FRAME + GLOSS + LAYER}
