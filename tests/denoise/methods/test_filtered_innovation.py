@@ -62,7 +62,7 @@ def with_lobes(frame):
 
 
 def with_layers(frame):
-    """The frame with a wall of tiles, of two objects, that a pane before its left half shows too."""
+    """The frame with a wall of tiles, of two objects, that a pane before its left half shows."""
     height, width = frame["id"].shape
     normal, point = np.array([0.1, -0.3, -0.9]), np.array([0, 0, 9])
     normal /= np.linalg.norm(normal)
