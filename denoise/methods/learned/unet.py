@@ -6,8 +6,9 @@ tells what the architecture is worth; beside `oidn-fast`, which has the same lay
 features, what Intel's training is. Its layers are in `unet_plan.py`, its input and what becomes of
 its result in `method.py`.
 
-Source: Open Image Denoise (see `unet_plan.py`). Code and weights are ours: half of its features,
-trained by `onespp train unet`.
+Sources: Ronneberger, Fischer and Brox 2015, "U-Net: Convolutional Networks for Biomedical Image
+Segmentation", doi:10.1007/978-3-319-24574-4_28; the layers of Open Image Denoise (see
+`unet_plan.py`). Code and weights are ours: half of its features, trained by `onespp train unet`.
 
 Departures:
 - The input is that of `rae-quarter`: light over albedo, compressed by g, two components of the
