@@ -1,6 +1,6 @@
 """The recurrent autoencoder, fed with frames that `onespp` has accumulated.
 
-    onespp denoise DIR --method docs/examples/accumulated_rae.py --set history.weights=FILE
+    onespp denoise DIR --method docs/examples/accumulated_rae.py --set weights=FILE
 
 FILE is what `onespp train rae --result accumulated` wrote: see "Controls of what is learned" in the
 page of the methods.
