@@ -346,8 +346,9 @@ def check_settings(words: list[str]) -> None:
     """Parameters of `--set` are a method's: the one that is named, or any."""
     settings = pairs(b for a, b in pairwise(words) if a == "--set")
     named = [b for a, b in pairwise(words) if a == "--method"]
-    if any(map(is_file, named)):
+    if any(is_file(name) and not (ROOT / name).exists() for name in named):
         return  # the reader's
+    named = [str(ROOT / name) if is_file(name) else name for name in named]
     for key, value in settings.items():
         able = [name for name in named or METHODS if key in parameters(build(name))]
         assert able, f"no method has the parameter {key}"
