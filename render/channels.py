@@ -158,7 +158,7 @@ _ROWS = (
             "share that the brightest other layer has in what glass or a mask shows, by what of "
             "its light gets here; 0: there is none"),
     Channel("layer_albedo", Group.LAYER, _rgb("layer.albedo"), HALF, Display.LIGHT, 0.0,
-            "`albedo` of that layer's surface, less what takes of its light on the way"),
+            "`albedo` of that layer's surface, less what is lost of its light on the way"),
     Channel("layer_normal", Group.LAYER, ("layer.N.X", "layer.N.Y", "layer.N.Z"), FLOAT,
             Display.AXES, 0.0, "its `normal`, of the image"),
     Channel("layer_depth", Group.LAYER, ("layer.Z",), EXACT, Display.RANGE, 0.0,

@@ -19,9 +19,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from onespp.render.channels import LAYER
 from onespp.render.frame import Frame
 
-LAYERS = ("layer_share", "layer_albedo", "layer_normal", "layer_depth", "layer_id")
 LEAST_ALBEDO = 0.25  # light of other layers is in it, which this makes at most so much brighter
 
 
@@ -31,7 +31,7 @@ def surface_of_gloss(frame: Frame) -> Frame | None:
     Its albedo is a where that is a layer, which is where roughness was 0 and is 1. None where the
     frame lacks the channels.
     """
-    if any(name not in frame for name in ("specular", "roughness", "albedo", *LAYERS)):
+    if any(name not in frame for name in ("specular", "roughness", "albedo", *LAYER)):
         return None
     share, roughness = frame["layer_share"], frame["roughness"]
     is_layer = (share > 0) & (roughness == 0)

@@ -38,15 +38,14 @@ from onespp.denoise.jit.arrays import Color, Float
 from onespp.denoise.jit.color import LuminanceColor, luminance, with_green
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import arrays_of
-from onespp.render.channels import GROUPED, UNSHADOWED
+from onespp.render.channels import GROUPED, LAYER, UNSHADOWED
 from onespp.render.frame import Frame
 
 from .demodulation import Texture, read_texture
-from .layers import LAYERS
 from .repair import repair
 
 USED = ("direct", "indirect", "unshadowed", "visibility", "specular", "roughness",
-        *LAYERS, *GROUPED)
+        *LAYER, *GROUPED)
 LARGEST_VISIBILITY = 2.0
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
 
 import drjit as dr
 
@@ -30,6 +30,14 @@ class PrimaryHit:
     si: mi.SurfaceInteraction3f
     depth_per_length: mi.Float
     behind: Replaced | None = None
+
+    @cached_property
+    def layer(self) -> PrimaryHit:
+        """What the brightest layer left aside comes to."""
+        assert self.behind is not None
+        layer = self.behind.layer
+        return PrimaryHit(self.stage, self.ray, layer.pi.compute_surface_interaction(layer.ray),
+                          self.depth_per_length, layer)
 
 
 def albedo(hit: PrimaryHit) -> mi.Color3f:
@@ -88,16 +96,6 @@ def layer_share(hit: PrimaryHit) -> mi.Float:
     return hit.behind.layer_share
 
 
-def _of_layer(guide: Callable[[PrimaryHit], Any]) -> Callable[[PrimaryHit], Any]:
-    """The same guide of what the brightest layer left aside comes to."""
-    def of_layer(hit: PrimaryHit) -> Any:
-        assert hit.behind is not None
-        layer = hit.behind.layer
-        return guide(PrimaryHit(hit.stage, hit.ray, layer.pi.compute_surface_interaction(layer.ray),
-                                hit.depth_per_length, layer))
-    return of_layer
-
-
 GBUFFER: dict[str, Callable[[PrimaryHit], mi.Float | mi.Vector3f | mi.Color3f | mi.Int32]] = {
     "albedo": albedo,
     "normal": normal,
@@ -106,8 +104,8 @@ GBUFFER: dict[str, Callable[[PrimaryHit], mi.Float | mi.Vector3f | mi.Color3f | 
     "id": object_id,
     "roughness": roughness,
     "layer_share": layer_share,
-    "layer_albedo": _of_layer(albedo),
-    "layer_normal": _of_layer(normal),
-    "layer_depth": _of_layer(depth),
-    "layer_id": _of_layer(object_id),
+    "layer_albedo": lambda hit: albedo(hit.layer),
+    "layer_normal": lambda hit: normal(hit.layer),
+    "layer_depth": lambda hit: depth(hit.layer),
+    "layer_id": lambda hit: object_id(hit.layer),
 }
