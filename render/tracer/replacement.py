@@ -58,8 +58,8 @@ class Replaced:
     before the last. length: of the image from the camera, in stage units. columns: of H. images:
     the shape that it is an image in, its index in the JIT registry, 0 for none; several: whether
     there is another. opacity: of a mask that the surface is cut out by, else 1; None if there are
-    no masks. other: what else is seen there, if anything in the scene is clear. aside: what of all that has no
-    noise.
+    no masks. other: what else is seen there, if anything in the scene is clear. aside: what of all
+    that has no noise.
     """
 
     ray: mi.Ray3f
