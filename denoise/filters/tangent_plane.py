@@ -1,4 +1,11 @@
-"""Weights by the distance of a tap from the pixel's tangent plane."""
+"""Weights by the distance of a tap from the pixel's tangent plane.
+
+Where a surface is rougher than pixels can show (leaves, grass) no two pixels share a plane, and
+nothing would be filtered. There a plane is worth less: with r the roughness, the least over the
+four lines through a pixel of the greater distance of its two neighbours on that line, and t the
+tolerated distance, slopes shrink by t / (t + r) and t grows to t + r. An edge, a crease or a bent
+surface is not rough: some line follows it. Our own.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +18,7 @@ import drjit as dr
 from onespp.denoise.inputs.surface import TangentPlane
 from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.fastmath import LOG2E
-from onespp.denoise.jit.taps import Offset, Taps
+from onespp.denoise.jit.taps import Offset, Taps, window
 
 BINOMIAL = {0: 1 / 2, 1: 1 / 4}
 OTHER_OBJECT_WEIGHT = 0.4      # of a pixel of another object, beside its distance
@@ -22,6 +29,23 @@ class SurfaceTap(NamedTuple):
 
     inverse_depth: Float
     id: Float
+
+_APART = 1e15  # distance of what is not the same surface
+
+
+def loosened(surfaces: Taps[SurfaceTap], plane: TangentPlane) -> TangentPlane:
+    """The planes as they count, given the 3x3 pixels around, of which the last is the pixel."""
+    center, distances = surfaces.at(-1), []
+    for i, (dy, dx) in enumerate(window(1)):
+        tap = surfaces.at(i)
+        expected = dr.fma(plane.dx, float(dx), dr.fma(plane.dy, float(dy), center.inverse_depth))
+        same = (tap.id == center.id) & (tap.inverse_depth > 0) & (center.inverse_depth > 0)
+        distances.append(dr.select(same, dr.abs(tap.inverse_depth - expected), _APART))
+    lines = [dr.maximum(a, b) for a, b in zip(distances[:4], distances[:3:-1], strict=True)]
+    rough = dr.minimum(dr.minimum(lines[0], lines[1]), dr.minimum(lines[2], lines[3]))
+    share = 1 / dr.fma(plane.scale, dr.select(rough < _APART, rough, 0), 1)
+    return TangentPlane(plane.inverse_depth, plane.dx * share, plane.dy * share,
+                        plane.scale * share)
 
 
 def surface_exponent(surfaces: Taps[SurfaceTap], plane: TangentPlane,

@@ -8,6 +8,8 @@ Apart from the kernels, so that scores, which need no Dr.Jit, do not load it.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from onespp.render.errors import InputError
@@ -37,3 +39,13 @@ def screen_from_camera(frame: Frame) -> np.ndarray:
     except np.linalg.LinAlgError:
         raise InputError(f"camera_from_world of frame {frame.index} is singular") from None
     return (frame.screen_from_world @ world_from_camera)[[0, 1, 3], :3]
+
+
+def pixel_angle(frame: Frame) -> float:
+    """Width of a pixel at depth 1; its height and width differ little, this is their mean.
+
+    Raises:
+        InputError: as `camera_from_screen`.
+    """
+    (a, b), (c, d) = camera_from_screen(frame)[:2, :2]
+    return math.sqrt(abs(a * d - b * c))

@@ -126,13 +126,58 @@ def kind_of(frame: Frame) -> np.ndarray:
 
 
 def geometry(p: Pixels, q: Pixels, dy: int, dx: int, m) -> np.ndarray:
-    distance = np.where(p.kind == 2, plane_weight_distance(p, q) / m.sigma_plane, 0)
+    distance = np.where(p.kind == 2, tolerated(p, q, m), 0)
     w = H[abs(dy)] * H[abs(dx)] * np.exp(-distance) * np.where(p.id == q.id, 1, 0.4)
     return np.where(p.kind == q.kind, w, 0)
 
 
 def pixels_of(frame: Frame, **more: np.ndarray) -> Pixels:
-    return oracles.read(frame, kind=kind_of(frame), id=frame["id"], **more)
+    eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
+    return oracles.read(frame, kind=kind_of(frame), id=frame["id"],
+                        foot=((frame["position"] - eye) * frame["normal"]).sum(-1),
+                        width=np.full(frame["id"].shape, width_of(frame)),
+                        rough=roughness_around(frame), **more)
+
+
+def width_of(frame: Frame) -> float:
+    """Of a pixel at depth 1."""
+    b = np.linalg.inv((frame.screen_from_world
+                       @ np.linalg.inv(frame.camera_from_world))[[0, 1, 3], :3])
+    return np.sqrt(np.linalg.norm(np.cross(b[:, 0], b[:, 1])[2:]))
+
+
+def roughness_around(frame: Frame) -> np.ndarray:
+    """Of the lines through a pixel, the least of how far its neighbours are from its plane."""
+    shape = frame["id"].shape
+    pixels, rough = oracles.read(frame, kind=kind_of(frame), id=frame["id"]), np.full(shape, np.inf)
+    for line in ((0, 1), (1, -1), (1, 0), (1, 1)):
+        farther = np.zeros(shape)
+        for sign in (-1, 1):
+            where, p, q = pairs(pixels, shape, sign * line[0], sign * line[1])
+            distance = np.full(shape, np.inf)
+            if where is not None:
+                same = (p.id == q.id) & (p.kind == 2) & (q.kind == 2)
+                distance[where] = np.where(same, plane_weight_distance(p, q), np.inf)
+            farther = np.maximum(farther, distance)
+        rough = np.minimum(rough, farther)
+    return np.where(np.isfinite(rough), rough, 0)
+
+
+def share_of(p: Pixels, m) -> np.ndarray:
+    """What a plane counts for where it is rough."""
+    return 1 / (1 + p.rough / (m.plane_pixels * p.width))
+
+
+def tolerated(p: Pixels, q: Pixels, m) -> np.ndarray:
+    """Distance of q from p's plane in tolerated ones: from a share of it that is left of one that
+    faces the camera."""
+    share, apart = share_of(p, m), plane_weight_distance(p, q)
+    both = np.isfinite(apart) & (p.surface > 0)
+    of_p, of_q = np.where(both, p.z, 1), np.where(both, q.z, 1)
+    sloped = (p.n * (p.position - q.position)).sum(-1) / of_q
+    facing = p.foot * (1 / of_q - 1 / of_p)
+    distance = np.where(both, np.abs(share * sloped + (1 - share) * facing), apart)
+    return distance * share / (m.plane_pixels * p.width)
 
 
 def smooth(frame: Frame, image: np.ndarray, counts: np.ndarray, levels: int, m,
@@ -178,7 +223,7 @@ def spread(frame: Frame, energy: np.ndarray, counts: np.ndarray, levels: int, m,
 
 def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, sigma: np.ndarray,
            fade: np.ndarray, narrow: np.ndarray, m, counts: np.ndarray | None = None,
-           theirs: float = 0.1) -> np.ndarray:
+           theirs: float = 0.2) -> np.ndarray:
     """The last filter; its last level's taps are weaker by `fade`, all by exp(-narrow r^2), and a
     pixel weighs as much as it counts. It compares the first three components, or the only one, by
     the pixel's variance and a share, `theirs`, of what a neighbour has more."""
@@ -220,8 +265,7 @@ def sample_variance(frame: Frame, samples: np.ndarray, there: np.ndarray, m) -> 
         where, p, q = pairs(pixels, shape, dy - 2, dx - 2)
         if where is None:
             continue
-        near = (q.there > 0) & (p.kind == q.kind) & ((p.kind < 2) | (
-            plane_weight_distance(p, q) < m.sigma_plane))
+        near = (q.there > 0) & (p.kind == q.kind) & ((p.kind < 2) | (tolerated(p, q, m) < 1))
         count[where] += near
         first[where] += near * q.x
         second[where] += near * q.x**2
@@ -240,8 +284,7 @@ def spatial_variance(frame: Frame, signal: np.ndarray, m) -> np.ndarray:
         where, p, q = pairs(pixels, shape, dy - 2, dx - 2)
         if where is not None:
             value[where] = q.x
-            near[where] = (p.kind == q.kind) & ((p.kind < 2) | (
-                plane_weight_distance(p, q) < m.sigma_plane))
+            near[where] = (p.kind == q.kind) & ((p.kind < 2) | (tolerated(p, q, m) < 1))
         taps[dy, dx] = value, near
     count, total = np.zeros(shape), np.zeros(shape)
     for cy, cx in np.ndindex(3, 3):
@@ -309,21 +352,23 @@ def shadow_history(previous: Frame, frame: Frame, told: np.ndarray, image: np.nd
     around = spread_out(frame, np.concatenate([moves, np.where(moves, shift, 0)], -1), m)
     near = (around[..., 0] > 1e-3) & (kind_of(frame) == 2)  # a lamp has no shadow
     shift = np.where(near[..., None], around[..., 1:] / np.maximum(around[..., :1], 1e-3), 0)
-    moved = on_tangent_planes(frame, shift, near)
+    moved = on_tangent_planes(frame, shift, near, m)
     history, found = look_up(previous, moved, image, m)
     return history, found & near
 
 
-def on_tangent_planes(frame: Frame, shift: np.ndarray, there: np.ndarray) -> Frame:
+def on_tangent_planes(frame: Frame, shift: np.ndarray, there: np.ndarray, m) -> Frame:
     """The frame with positions moved by (h, w, 2) pixels on the screen, where there."""
-    position = frame["position"].astype(float)
+    position, share = frame["position"].astype(float), share_of(pixels_of(frame), m)
     eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
     for y, x in np.argwhere(there & (frame["id"] >= 0)):
         column, row = shift[y, x] + [x + 0.5, y + 0.5]
         on_screen = np.linalg.inv(frame.screen_from_world) @ [column, row, 1, 1]
         ray = on_screen[:3] / on_screen[3] - eye
         n = frame["normal"][y, x].astype(float)
-        position[y, x] = eye + ray * (n @ (position[y, x] - eye)) / (n @ ray)
+        on_plane = ray * (n @ (position[y, x] - eye)) / (n @ ray)
+        farther = frame["depth"][y, x] / (frame.screen_from_world[3, :3] @ on_plane)
+        position[y, x] = eye + on_plane * farther / (1 + share[y, x] * (farther - 1))
     return Frame(frame.index, {**frame.images, "position": position}, frame.camera_from_world,
                  frame.screen_from_world, frame.world_from_object)
 
@@ -476,7 +521,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict
                 sigmas = sigma * np.clip(roughness_of(frame) / 0.1, least, 1)
             out[name] = guided(frame, history, s2, levels, sigmas, fade, narrow, m,
                                np.clip(samples, 1e-5, 1) if sparse else None,
-                               0.1 if name in ("L", "G") else 0)
+                               0.2 if name in ("L", "G") else 0)
             if sparse:
                 history = np.where(samples[..., None] > 1e-5, history, out[name])
             kept[name] = history, s2, np.minimum(samples, 64)

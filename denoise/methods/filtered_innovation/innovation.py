@@ -45,7 +45,7 @@ what the filter found.
 A smoothing is a-trous levels of 3x3 taps, h = {1/4, 1/2, 1/4}^2, 2^i pixels apart. The last filter
 of h compares luminance too,
 
-    w = h exp(-distance(q, p's plane) / (sigma_plane z(p)) - ((l(p) - l(q)) / (sigma s))^2)
+    w = h exp(-distance(q, p's plane) / (plane_pixels width(p)) - ((l(p) - l(q)) / (sigma s))^2)
 
 sigma being less for glossy light the narrower its lobe is, down to a mirror's at roughness 0,
 and its last level fades out as the history grows. A pixel of another object counts for two fifths.

@@ -22,6 +22,7 @@ from typing import ClassVar, NamedTuple
 import drjit as dr
 
 from onespp.denoise.filters.atrous import BACKGROUND, LARGEST_LEVELS
+from onespp.denoise.geometry.cameras import pixel_angle
 from onespp.denoise.history.records import RecordState, no_history
 from onespp.denoise.history.reflections import lobes_between
 from onespp.denoise.history.reprojection import ReprojectionTests, motion_between, without_images
@@ -59,7 +60,8 @@ from .passes import Passes
 from .texture import LEVELS, at_rest_between
 
 _LAMP = 2 * BACKGROUND    # 1/z where albedo is 0: far from any plane, and from background
-_BACKGROUND_SCALE = 1e3   # |k| / sigma_plane of background and lamps: only their like counts
+LARGE = 640**2            # pixels of an image whose last filter has a level more
+_BACKGROUND_SCALE = 1e3   # of 1/z of background and lamps: only their like counts
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         visibility_change: the same of visibility [1, 0 to 1e6].
         innovation_levels: levels of the innovation's smoothing, of diffuse light [1, 2 to 8].
         output_levels: levels of the last filter of diffuse light while there is no history; the
-            last of them fades out over `fade_frames` [1, 1 to 8].
+            last of them fades out over `fade_frames` [1, 1 to 8]. Large images (`LARGE`) have
+            one more, if it is not farther than that of the innovation.
         sharp_innovation_levels: as `innovation_levels`, of visibility and glossy light, and no
             more than those [1, 2 to 8].
         sharp_output_levels: as `output_levels`, of visibility and glossy light, and no more than
@@ -122,7 +125,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         mirror_sigma: the same of what mirrors reflect, at most `light_sigma`; between the two
             where lobes are narrow [standard deviations, above 0].
         fade_frames: history length at which the last level has faded out [frames, above 0].
-        sigma_plane: falloff with distance from the tangent plane [share of depth, above 0].
+        plane_pixels: falloff with distance from the tangent plane [widths of a pixel there,
+            above 0].
         max_history_length: cap of the history length [frames, 1 to 1e6].
         min_cosine: least cosine between a history tap's normal and the expected one, see
             `reprojection.py` [1, -1 to 1].
@@ -155,12 +159,12 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     output_levels: int = 4
     sharp_innovation_levels: int = 3
     sharp_output_levels: int = 3
-    light_sigma: float = 8.0
+    light_sigma: float = 5.0
     texture_sigma: float = 3.5
-    visibility_sigma: float = 6.0
+    visibility_sigma: float = 5.0
     mirror_sigma: float = 1.6
     fade_frames: float = 4.0
-    sigma_plane: float = 0.005
+    plane_pixels: float = 0.8
     max_history_length: float = 64.0
     min_cosine: float = 0.5
     plane_tolerance: float = 0.02
@@ -184,7 +188,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         check_range(self, "max_history_length", 1.0, 1e6)
         check_range(self, "min_cosine", -1.0, 1.0)
         check_positive(self, "light_sigma", "texture_sigma", "visibility_sigma", "mirror_sigma",
-                       "fade_frames", "sigma_plane", "penumbra", "plane_tolerance")
+                       "fade_frames", "plane_pixels", "penumbra", "plane_tolerance")
 
     @property
     def reach(self) -> int:
@@ -203,7 +207,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         rays = None
         if self.follow_shadows and light.unshadowed and has_shadow_rays(frame):
             rays = read_shadow_rays(frame, previous, stencil)
-        layout = self._layout(light, rays is not None)
+        layout = self._layout(light, rays is not None, stencil)
         if of_gloss is None or SignalKind.GLOSSY not in layout.kinds:
             output, after = self._filtered(_Given(
                 frame, layout, light.listed, light.chosen, surface, light.texture.zero_albedo, rays,
@@ -229,7 +233,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         stencil, previous, sample = state.stencil, state.previous or frame, surface.sample
         layout, rays = given.layout, given.rays
         motion = motion_between(previous, frame, stencil)
-        plane = self._tangent_plane(surface, given.zero_albedo, stencil)
+        plane = self._tangent_plane(frame, surface, given.zero_albedo, stencil)
         passes, records = state.passes, state.records
         if passes is None:
             passes = Passes.make(stencil, layout)
@@ -244,7 +248,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         evaluate(signals, sample, plane, id_, (rays, surface.position) if rays else None, chosen,
                  lobes, narrower)
 
-        passes.store_surface(id_, plane)
+        plane = passes.store_surface(id_, plane)
         shadows = passes.spread_shadows(rays, sample, surface.position, plane, chosen)
         innovations = passes.find_innovations(
             signals, chosen, sample, plane, motion, records, shadows,
@@ -261,20 +265,23 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         return output, replace(state, passes=passes, records=records,
                                previous=without_images(frame))
 
-    def _layout(self, light: Signals, has_shadow_rays: bool) -> SignalLayout:
+    def _layout(self, light: Signals, has_shadow_rays: bool, stencil: Stencil) -> SignalLayout:
         has_texture = light.texture.albedo is None and len(light.kinds) == 1
         levels = min(self.innovation_levels, LEVELS) if has_texture else self.innovation_levels
+        wider = int(stencil.height * stencil.width > LARGE
+                    and self.output_levels < self.innovation_levels)
         return SignalLayout(light.kinds, light.groups, has_shadow_rays, levels,
-                            min(self.sharp_innovation_levels, levels), self.output_levels,
-                            self.sharp_output_levels, has_texture)
+                            min(self.sharp_innovation_levels, levels), self.output_levels + wider,
+                            self.sharp_output_levels + wider, has_texture)
 
-    def _tangent_plane(self, surface: Surface, zero_albedo: Bool | None,
+    def _tangent_plane(self, frame: Frame, surface: Surface, zero_albedo: Bool | None,
                        stencil: Stencil) -> TangentPlane:
         """Tangent planes in 1/z. Where there is none (background, lamps) 1/z is far from any other
         and the scale so large that such pixels blend with their like alone."""
         is_valid = surface.is_valid
         inverse_depth = dr.select(is_valid, surface.inverse_depth, stencil.Float(BACKGROUND))
-        scale = dr.abs(surface.plane_distance) * stencil.opaque(1 / self.sigma_plane)
+        scale = dr.abs(surface.plane_distance) * stencil.opaque(
+            1 / (self.plane_pixels * pixel_angle(frame)))
         if zero_albedo is not None:
             inverse_depth = dr.select(is_valid & zero_albedo, _LAMP, inverse_depth)
             is_valid &= ~zero_albedo

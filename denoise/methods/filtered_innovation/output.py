@@ -22,7 +22,7 @@ from .smoothing import footprint
 
 FEWEST_SAMPLES = 1e-5          # that a sparse signal's pixel counts for where it has none
 WIDE_LOBE = 0.1                # roughness: such a lobe blurs an image as far as the filter does
-NEIGHBOURS_NOISE = 0.1         # share of a noisier neighbour's variance beyond the pixel's own
+NEIGHBOURS_NOISE = 0.2         # share of a noisier neighbour's variance beyond the pixel's own
 _NEVER = -1e3                  # log2 of a weight that is 0
 
 

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import drjit as dr
 
-from onespp.denoise.filters.tangent_plane import SurfaceTap
+from onespp.denoise.filters.tangent_plane import SurfaceTap, loosened
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
 from onespp.denoise.inputs.shadow_rays import ShadowRays
 from onespp.denoise.inputs.signals import Chosen, Signal
@@ -30,6 +30,7 @@ from .texture import CHOICE_RULES, RESIDUAL_RULES, Residual, residual, restored
 _OUTSIDE = -1e15          # 1/z outside the image
 _ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH = range(3)  # planes of the surface
 _SHADOW_PLANES = 5        # of `Shadows`
+_AROUND = [*window(1), (0, 0)]
 T = TypeVar("T")
 
 
@@ -48,7 +49,7 @@ class Level:
     def make(i: int, planes: Planes, count: int, surfaces: Planes, inverse_depth: int,
              function: Callable[..., Any], named: Callable[..., Any] | None = None) -> Level:
         """Level i, over `count` planes; inverse_depth: which of the planes of `surfaces`."""
-        offsets = [(dy << i, dx << i) for dy, dx in (*window(1), (0, 0))]
+        offsets = [(dy << i, dx << i) for dy, dx in _AROUND]
         values = planes.taps(offsets, range(count))
         return Level(values.named(named) if named else values,
                      surfaces.taps(offsets, [inverse_depth, _ID]).named(SurfaceTap),
@@ -63,12 +64,15 @@ class Passes:
     Attributes:
         surfaces: planes of object ID, 1/z, and 1/z of what has a history.
         buffer: planes of what is being smoothed or filtered, see `layout.py`.
+        around: surfaces of the 3x3 pixels around.
     """
 
     stencil: Stencil
     layout: SignalLayout
     surfaces: Planes
     buffer: Planes
+    around: Taps[SurfaceTap]
+    loosen: Step[..., TangentPlane]
     follow_shadows: Step[..., list[Shadows]]
     spread: Level
     find_innovations: Step[..., Innovations]
@@ -110,6 +114,8 @@ class Passes:
                       for i in range(min(CHOICE_RULES[0].levels, layout.innovation_levels))]
         return Passes(
             stencil, layout, surfaces, buffer,
+            surfaces.taps(_AROUND, [_INVERSE_DEPTH, _ID]).named(SurfaceTap),
+            Step(loosened),
             Step(lambda chosen, *a: of_each_light(follow_shadows(stencil, *a), chosen,
                                                   layout.groups)),
             Level.make(SPREAD_LEVEL, buffer, len(spread), surfaces, _INVERSE_DEPTH,
@@ -128,8 +134,10 @@ class Passes:
             Step(restored),
             Step(lambda *a: pack_history(stencil, layout, *a)))
 
-    def store_surface(self, id_: Float, plane: TangentPlane) -> None:
+    def store_surface(self, id_: Float, plane: TangentPlane) -> TangentPlane:
+        """The tangent planes as they count from here on."""
         self.surfaces.store([id_, plane.inverse_depth])
+        return self.loosen(self.around, plane)
 
     def spread_shadows(self, rays: ShadowRays | None, surface: SurfaceSample, position: Vector3,
                        plane: TangentPlane, chosen: Chosen | None) -> list[Shadows]:

@@ -85,6 +85,21 @@ def with_layers(frame):
         layer_id=np.where(there, 2 * tiles, -1))
 
 
+def with_leaves(frame, seed=0):
+    """The frame with leaves smaller than a pixel in the place of a part of its wall."""
+    rng = np.random.default_rng(seed)
+    shape = frame["id"].shape
+    leaves = ((frame["id"] == 0) & (np.arange(shape[1]) > shape[1] // 3))[..., None]
+    eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
+    nearer = np.where(leaves[..., 0], rng.uniform(0.97, 1.03, shape), 1)
+    position = eye + (frame["position"] - eye) * nearer[..., None]
+    normal = rng.normal(size=(*shape, 3)) - 1.5 * (position - eye) / np.maximum(np.linalg.norm(
+        position - eye, axis=-1, keepdims=True), 1e-9)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    return with_images(frame, depth=frame["depth"] * nearer, position=position,
+                       normal=np.where(leaves, normal, frame["normal"]))
+
+
 def split(height, width, count=3, lobes=True, layers=False):
     """Moving frames with all channels that the method uses, but for those of layers unless asked
     for, a lamp, and three objects."""
@@ -105,6 +120,25 @@ def split(height, width, count=3, lobes=True, layers=False):
         frame = with_layers(frame) if layers else frame
         frames.append(with_neighbour(with_shadow_rays(frame, i)))
     return frames
+
+
+def test_of_leaves_it_is_the_formula_in_float64():
+    frames = [with_leaves(frame, i) for i, frame in enumerate(split(19, 26))]
+    method = FilteredInnovation()
+    image, _ = run(method, frames)
+    expected = innovation_oracle.run(frames, method)
+    np.testing.assert_allclose(image, expected, rtol=1e-3, atol=5e-5)
+
+
+@pytest.mark.parametrize(("height", "width", "levels"), [(640, 640, (4, 3)), (640, 641, (5, 4))])
+def test_a_large_image_has_a_level_more(height, width, levels):
+    stencil = Stencil(height, width, 1)
+    frame = split(4, 5, 1)[0]
+    light = read_signals(frame, read_color(frame, Stencil(4, 5, 1)), Stencil(4, 5, 1), True, True)
+    layout = FilteredInnovation()._layout(light, False, stencil)
+    assert (layout.output_levels, layout.sharp_output_levels) == levels
+    layout = FilteredInnovation(innovation_levels=4)._layout(light, False, stencil)
+    assert layout.output_levels == 4
 
 
 @pytest.mark.parametrize("shadows", [True, False])
@@ -308,7 +342,7 @@ def test_five_frames_are_one_recording_and_parameters_compile_nothing(layers):
     frames = split(16, 20, 5, layers=layers)
     run(FilteredInnovation(), frames)
     other = FilteredInnovation(light_alpha=0.1, visibility_sigma=3.0, fade_frames=3.0, penumbra=2.0,
-                               sigma_plane=0.02, max_history_length=9.0, plane_tolerance=0.03,
+                               plane_pixels=2.0, max_history_length=9.0, plane_tolerance=0.03,
                                light_change=3.0, glossy_change=2.0, visibility_change=1.0)
     assert compiled(lambda: run(other, frames)) == 0
     _, state = run(FilteredInnovation(), frames)
