@@ -84,7 +84,9 @@ class Signals:
         kinds: of signals: L, then G and V where they are apart. listed: the signals. That of a
             group's visibility is y, 0 where the ray went to another group.
         unshadowed: what each V is a share of. texture: albedo and emission.
-        chosen: None where all lights are one. roughness: where G is apart and its lobes are known.
+        chosen: None where all lights are one. lit: 1 where U is above 0, else 0: V is not known
+            there, and 0; None where lights are in groups, or V is not apart.
+        roughness: where G is apart and its lobes are known.
         lobe: the same, but 1 where G is the (diffuse) light of a layer. of_gloss: texture of G,
             where that is known (`layers.py`).
     """
@@ -94,6 +96,7 @@ class Signals:
     unshadowed: list[Color]
     texture: Texture
     chosen: Chosen | None = None
+    lit: Float | None = None
     roughness: Float | None = None
     lobe: Float | None = None
     of_gloss: Texture = field(default_factory=Texture)
@@ -137,7 +140,7 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
         texture = Texture(texture.albedo, Color(*load("emission")), texture.zero_albedo)
     light = Color(*[d + i for d, i in zip(load("direct"), load("indirect"))])
     kinds, apart, unshadowed, chosen, roughness = [SignalKind.DIFFUSE], [], [], None, None
-    texture_of_gloss, lobe = Texture(), None
+    texture_of_gloss, lobe, lit = Texture(), None, None
     if gloss and "specular" in frame:
         specular = Color(*load("specular"))
         light = Color(*[c - g for c, g in zip(light, specular)])
@@ -164,7 +167,9 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
             told = [v * scale for v in visibility]
         else:
             unshadowed = [Color(*load("unshadowed"))]
-            told = visibility = [_capped(v) for v in load("visibility")]
+            lit = dr.select(dr.maximum(dr.maximum(*unshadowed[0][:2]), unshadowed[0][2]) > 0,
+                            stencil.Float(1), 0)
+            told = visibility = [_capped(v) * lit for v in load("visibility")]
         for v, u in zip(told, unshadowed, strict=True):
             light = _with(light, -v, u)
         kinds += [SignalKind.VISIBILITY] * len(visibility)
@@ -176,7 +181,7 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
         apart[0] = Signal(*[g + m for g, m in zip(apart[0], more)])
         light = Color(*[dr.select(is_bare, 0, c) for c in light])
     diffuse = _of_light(Texture(texture.albedo).demodulate(light))
-    return Signals(tuple(kinds), [diffuse, *apart], unshadowed, texture, chosen, roughness,
+    return Signals(tuple(kinds), [diffuse, *apart], unshadowed, texture, chosen, lit, roughness,
                    lobe, texture_of_gloss)
 
 

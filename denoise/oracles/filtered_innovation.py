@@ -307,6 +307,16 @@ def look_up(previous: Frame, frame: Frame, image: np.ndarray, m) -> tuple:
     return np.where(found[..., None], history, 0), found
 
 
+def of_lit_neighbours(frame: Frame, visibility: np.ndarray, m) -> np.ndarray:
+    """Visibility, where there is no unshadowed light that of the neighbours that have some."""
+    lit = (frame["unshadowed"] > 0).any(-1)[..., None]
+    known = np.where(lit, visibility, 0)
+    around = smooth(frame, np.concatenate([known, lit], -1), np.ones(frame["id"].shape), 1, m)
+    some = around[..., 1:] > 0
+    mean = around[..., :1] / np.where(some, around[..., 1:], 1)
+    return np.where(lit | ~some, known, mean)
+
+
 def shadow_shift(previous: Frame, frame: Frame, told: np.ndarray | None = None) -> np.ndarray:
     """(h, w, 2) pixels by which each pixel's shadow was elsewhere; NaN if it was not, or was not
     told of.
@@ -421,6 +431,8 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict
     lengths: dict[str, np.ndarray] = {}  # by what has one, see `length_of`
     previous, out = None, {}
     for frame, signals in zip(frames, given, strict=True):
+        if "V" in signals:
+            signals = {**signals, "V": of_lit_neighbours(frame, signals["V"], m)}
         found = np.zeros(frame["id"].shape, bool)
         ns = {length_of(frame, name): np.ones(found.shape) for name in signals}
         if previous is not None:
@@ -521,7 +533,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict
                 sigmas = sigma * np.clip(roughness_of(frame) / 0.1, least, 1)
             out[name] = guided(frame, history, s2, levels, sigmas, fade, narrow, m,
                                np.clip(samples, 1e-5, 1) if sparse else None,
-                               0.2 if name in ("L", "G") else 0)
+                               {"L": 0.2, "G": 1.0}.get(name, 0))
             if sparse:
                 history = np.where(samples[..., None] > 1e-5, history, out[name])
             kept[name] = history, s2, np.minimum(samples, 64)

@@ -84,6 +84,7 @@ class _Given(NamedTuple):
     chosen: Chosen | None
     surface: Surface
     zero_albedo: Bool | None
+    lit: Float | None
     rays: ShadowRays | None
     roughness: Float | None
     lobe: Float | None
@@ -159,7 +160,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     output_levels: int = 4
     sharp_innovation_levels: int = 3
     sharp_output_levels: int = 3
-    light_sigma: float = 5.0
+    light_sigma: float = 6.0
     texture_sigma: float = 3.5
     visibility_sigma: float = 5.0
     mirror_sigma: float = 1.6
@@ -210,19 +211,19 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         layout = self._layout(light, rays is not None, stencil)
         if of_gloss is None or SignalKind.GLOSSY not in layout.kinds:
             output, after = self._filtered(_Given(
-                frame, layout, light.listed, light.chosen, surface, light.texture.zero_albedo, rays,
-                light.roughness, light.lobe), state)
+                frame, layout, light.listed, light.chosen, surface, light.texture.zero_albedo,
+                light.lit, rays, light.roughness, light.lobe), state)
             return light.color(output), replace(after, layered=None)
         signals, glossy = list(light.listed), layout.kinds.index(SignalKind.GLOSSY)
         rest, alone = layout.without_gloss()
         (gloss,), layered = self._filtered(_Given(
             of_gloss, alone, [signals.pop(glossy)], None, read_surface(of_gloss, stencil),
-            read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, light.roughness,
-            light.lobe),
+            read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, None,
+            light.roughness, light.lobe),
             state.layered or InnovationState(stencil, no_history(stencil)))
         output, after = self._filtered(_Given(
-            frame, rest, signals, light.chosen, surface, light.texture.zero_albedo, rays, None,
-            None), state)
+            frame, rest, signals, light.chosen, surface, light.texture.zero_albedo, light.lit, rays,
+            None, None), state)
         output.insert(glossy, gloss)
         return light.color(output), replace(after, layered=layered)
 
@@ -245,10 +246,12 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             lobes = lobes_between(previous, frame, given.lobe, surface.position, stencil)
             narrower = narrowed(given.roughness,
                                 stencil.opaque(min(self.mirror_sigma / self.light_sigma, 1)))
-        evaluate(signals, sample, plane, id_, (rays, surface.position) if rays else None, chosen,
-                 lobes, narrower)
+        evaluate(signals, given.lit, sample, plane, id_, (rays, surface.position) if rays else None,
+                 chosen, lobes, narrower)
 
         plane = passes.store_surface(id_, plane)
+        if given.lit is not None:
+            signals = passes.with_visibility_of_unlit(signals, given.lit, plane)
         shadows = passes.spread_shadows(rays, sample, surface.position, plane, chosen)
         innovations = passes.find_innovations(
             signals, chosen, sample, plane, motion, records, shadows,

@@ -22,7 +22,8 @@ from .smoothing import footprint
 
 FEWEST_SAMPLES = 1e-5          # that a sparse signal's pixel counts for where it has none
 WIDE_LOBE = 0.1                # roughness: such a lobe blurs an image as far as the filter does
-NEIGHBOURS_NOISE = 0.2         # share of a noisier neighbour's variance beyond the pixel's own
+NEIGHBOURS_NOISE = {           # share of a noisier neighbour's variance beyond the pixel's own
+    SignalKind.DIFFUSE: 0.2, SignalKind.GLOSSY: 1.0, SignalKind.VISIBILITY: 0.0}
 _NEVER = -1e3                  # log2 of a weight that is 0
 
 
@@ -92,17 +93,19 @@ class _Rule(NamedTuple):
     they are judged by.
 
     Judged by the pixel's own, a bright pixel, which is noisy, takes from dark ones what they do not
-    take from it, and light is lost. So light counts some of the neighbour's. Visibility does not:
-    a shadow's edge is noisier than what it is the edge of.
+    take from it, and light is lost. So diffuse light counts some of the neighbour's (more would
+    spread what is rare), glossy light all of it. Visibility does not: a shadow's edge is noisier
+    than what it is the edge of.
     """
 
     nearer: Callable[[Float, Offset], Float]
     fade: Float | None
-    symmetric: bool
+    neighbours_noise: float
 
     def noise(self, own: Float, neighbours: Float) -> Float:
-        return (dr.fma(NEIGHBOURS_NOISE, dr.maximum(neighbours - own, 0), own) if self.symmetric
-                else own)
+        if not self.neighbours_noise:
+            return own
+        return dr.fma(self.neighbours_noise, dr.maximum(neighbours - own, 0), own)
 
     @staticmethod
     def of(layout: SignalLayout, s: int, level: int, falloff: OutputFalloff,
@@ -111,7 +114,7 @@ class _Rule(NamedTuple):
         fade = falloff.fades[s] if g is None else falloff.sparse_fades[g]
         return _Rule(footprint(None if f is None else falloff.footprints[f], spacing),
                      fade if layout.is_last_level(s, level) else None,
-                     layout.kinds[s] is not SignalKind.VISIBILITY)
+                     NEIGHBOURS_NOISE[layout.kinds[s]])
 
 
 def _start(center: NoisySignal, h0: float) -> NoisySignal:

@@ -31,6 +31,7 @@ _OUTSIDE = -1e15          # 1/z outside the image
 _ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH = range(3)  # planes of the surface
 _SHADOW_PLANES = 5        # of `Shadows`
 _AROUND = [*window(1), (0, 0)]
+_LIT_RULES = [PlaneRule(1)] * 2
 T = TypeVar("T")
 
 
@@ -64,7 +65,7 @@ class Passes:
     Attributes:
         surfaces: planes of object ID, 1/z, and 1/z of what has a history.
         buffer: planes of what is being smoothed or filtered, see `layout.py`.
-        around: surfaces of the 3x3 pixels around.
+        around: surfaces of the 3x3 pixels around. lit: smoothing of what unlit pixels are given.
     """
 
     stencil: Stencil
@@ -73,6 +74,8 @@ class Passes:
     buffer: Planes
     around: Taps[SurfaceTap]
     loosen: Step[..., TangentPlane]
+    lit: Level
+    give: Step[..., Float]
     follow_shadows: Step[..., list[Shadows]]
     spread: Level
     find_innovations: Step[..., Innovations]
@@ -91,6 +94,7 @@ class Passes:
         surfaces = stencil.planes([-1.0, _OUTSIDE, _OUTSIDE])
         spread = [PlaneRule(SPREAD_LEVEL)] * (_SHADOW_PLANES * (layout.groups or 1))
         buffer = stencil.planes([0.0] * max(len(layout.smoothing_rules), len(spread),
+                                            len(_LIT_RULES),
                                             layout.output_planes(layout.output_level(0))))
 
         def smoothing(i: int) -> Level:
@@ -116,6 +120,9 @@ class Passes:
             stencil, layout, surfaces, buffer,
             surfaces.taps(_AROUND, [_INVERSE_DEPTH, _ID]).named(SurfaceTap),
             Step(loosened),
+            Level.make(0, buffer, len(_LIT_RULES), surfaces, _INVERSE_DEPTH,
+                       lambda *a: smooth_level(_LIT_RULES, *a)),
+            Step(given_by_neighbours),
             Step(lambda chosen, *a: of_each_light(follow_shadows(stencil, *a), chosen,
                                                   layout.groups)),
             Level.make(SPREAD_LEVEL, buffer, len(spread), surfaces, _INVERSE_DEPTH,
@@ -138,6 +145,16 @@ class Passes:
         """The tangent planes as they count from here on."""
         self.surfaces.store([id_, plane.inverse_depth])
         return self.loosen(self.around, plane)
+
+    def with_visibility_of_unlit(self, signals: list[Signal], lit: Float,
+                                 plane: TangentPlane) -> list[Signal]:
+        """Signals whose last is visibility: where a pixel has no unshadowed light, `lit` is 0 and
+        nothing is known of it, such as on the back of a leaf, it gets what its neighbours have, of
+        which it would else take some away."""
+        *others, visibility = signals
+        around = self._through([self.lit], [visibility.luminance, lit], plane)
+        known = self.give(visibility.luminance, lit, *around)
+        return [*others, visibility._replace(luminance=known)]
 
     def spread_shadows(self, rays: ShadowRays | None, surface: SurfaceSample, position: Vector3,
                        plane: TangentPlane, chosen: Chosen | None) -> list[Shadows]:
@@ -187,6 +204,15 @@ class Passes:
             planes[:level.count] = level.step(level.values, level.surfaces, plane, level.spacing,
                                               *arguments)
         return build(form, planes)
+
+
+def given_by_neighbours(value: Float, is_known: Float, around: Float, share: Float) -> Float:
+    """A value, where it is not known that of the neighbours that know it, if any do.
+
+    around, share: means over the neighbours of what is known, else 0, and of whether it is.
+    """
+    given = (is_known == 0) & (share > 0)
+    return dr.select(given, around / dr.select(given, share, 1), value)
 
 
 def _counted(noisy: NoisySignal) -> NoisySignal:

@@ -86,7 +86,8 @@ def with_layers(frame):
 
 
 def with_leaves(frame, seed=0):
-    """The frame with leaves smaller than a pixel in the place of a part of its wall."""
+    """The frame with leaves smaller than a pixel in the place of a part of its wall, of which a
+    third is not lit."""
     rng = np.random.default_rng(seed)
     shape = frame["id"].shape
     leaves = ((frame["id"] == 0) & (np.arange(shape[1]) > shape[1] // 3))[..., None]
@@ -96,7 +97,9 @@ def with_leaves(frame, seed=0):
     normal = rng.normal(size=(*shape, 3)) - 1.5 * (position - eye) / np.maximum(np.linalg.norm(
         position - eye, axis=-1, keepdims=True), 1e-9)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    lit = ~leaves | (rng.random((*shape, 1)) < 2 / 3)
     return with_images(frame, depth=frame["depth"] * nearer, position=position,
+                       unshadowed=frame["unshadowed"] * lit, direct=frame["direct"] * lit,
                        normal=np.where(leaves, normal, frame["normal"]))
 
 
@@ -128,6 +131,18 @@ def test_of_leaves_it_is_the_formula_in_float64():
     image, _ = run(method, frames)
     expected = innovation_oracle.run(frames, method)
     np.testing.assert_allclose(image, expected, rtol=1e-3, atol=5e-5)
+
+
+def test_pixels_without_unshadowed_light_take_no_visibility_from_their_neighbours():
+    frame = split(12, 16, 1, lobes=False)[0]
+    rows, columns = np.mgrid[:12, :16]
+    lit = ((rows + columns) % 2 == 0)[..., None] * frame["unshadowed"]
+    full = with_images(frame, unshadowed=lit, direct=lit, visibility=np.ones((12, 16)),
+                       indirect=0 * lit, specular=0 * lit, color=frame["emission"] + lit)
+    images = [run(FilteredInnovation(), [with_images(full, visibility=visibility)])[0]
+              for visibility in (full["visibility"], np.where(lit.any(-1), 1, 0))]
+    np.testing.assert_array_equal(*images)
+    np.testing.assert_allclose(images[1], full["color"], rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.parametrize(("height", "width", "levels"), [(640, 640, (4, 3)), (640, 641, (5, 4))])
