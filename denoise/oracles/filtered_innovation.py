@@ -309,7 +309,7 @@ def look_up(previous: Frame, frame: Frame, image: np.ndarray, m) -> tuple:
 
 def of_lit_neighbours(frame: Frame, visibility: np.ndarray, m) -> np.ndarray:
     """Visibility, where there is no unshadowed light that of the neighbours that have some."""
-    lit = (frame["unshadowed"] > 0).any(-1)[..., None]
+    lit = (frame["unshadowed"] > 0).any(-1, keepdims=True)
     known = np.where(lit, visibility, 0)
     around = smooth(frame, np.concatenate([known, lit], -1), np.ones(frame["id"].shape), 1, m)
     some = around[..., 1:] > 0
@@ -362,14 +362,16 @@ def shadow_history(previous: Frame, frame: Frame, told: np.ndarray, image: np.nd
     around = spread_out(frame, np.concatenate([moves, np.where(moves, shift, 0)], -1), m)
     near = (around[..., 0] > 1e-3) & (kind_of(frame) == 2)  # a lamp has no shadow
     shift = np.where(near[..., None], around[..., 1:] / np.maximum(around[..., :1], 1e-3), 0)
-    moved = on_tangent_planes(frame, shift, near, m)
+    moved = on_tangent_planes(frame, shift, near, share_of(pixels_of(frame), m))
     history, found = look_up(previous, moved, image, m)
     return history, found & near
 
 
-def on_tangent_planes(frame: Frame, shift: np.ndarray, there: np.ndarray, m) -> Frame:
-    """The frame with positions moved by (h, w, 2) pixels on the screen, where there."""
-    position, share = frame["position"].astype(float), share_of(pixels_of(frame), m)
+def on_tangent_planes(frame: Frame, shift: np.ndarray, there: np.ndarray,
+                      share: np.ndarray | float = 1.0) -> Frame:
+    """The frame with positions moved by (h, w, 2) pixels on the screen, where there; share: of
+    `share_of`."""
+    position, share = frame["position"].astype(float), share * np.ones(there.shape)
     eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
     for y, x in np.argwhere(there & (frame["id"] >= 0)):
         column, row = shift[y, x] + [x + 0.5, y + 0.5]
@@ -504,7 +506,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict
             known = np.minimum(samples, left)
             a = (np.maximum(1 / (known + omega + 0.5 * np.minimum(left, 1)), alpha) if sparse
                  else np.maximum(np.maximum(1 / n, alpha), turn))
-            follow = np.maximum(m.sharp_min_gain, alpha)
+            follow = np.maximum(m.glossy_gain, alpha)
             if name != "G":
                 certain = 1 - m.noise_threshold * q / np.maximum(lum(wide) ** 2, 1e-20)
                 follow = np.maximum(certain, m.min_gain if name == "L" else m.sharp_min_gain)

@@ -16,7 +16,7 @@ and a signal takes the share f of it:
     h <- h + f S[e] + a (e - S[e])
 
     diffuse light, whose changes are slow        f = max(c, g)
-    glossy light                                 f = g',          a = max(1 / n, alpha, t)
+    glossy light                                 f = g'',         a = max(1 / n, alpha, t)
     visibility, whose changes have sharp edges   f = max(c, g'),  a = max(1 / n, alpha, r c)
 
     s^2 <- (1 - a)^2 s^2 + a^2 s_0^2,   s_0^2 = max(W[l(e)^2] - s^2, W[l(e)^2] / 4)

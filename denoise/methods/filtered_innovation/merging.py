@@ -36,7 +36,7 @@ class Gains(NamedTuple):
 
     Attributes:
         alphas: of each signal. min_gain: g. noise_threshold: k. sharp_min_gain: g'.
-        change_alpha: r. fade_frames: until the last filter has faded.
+        glossy_gain: g''. change_alpha: r. fade_frames: until the last filter has faded.
         changes: p of each signal, of `change.py`.
     """
 
@@ -44,6 +44,7 @@ class Gains(NamedTuple):
     min_gain: Float
     noise_threshold: Float
     sharp_min_gain: Float
+    glossy_gain: Float
     change_alpha: Float
     fade_frames: Float
     changes: list[Float]
@@ -99,7 +100,7 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
             zip(layout.kinds, signals, smoothed.each, strict=True)):
         e = innovations.signals[s]
         variance, omega, samples = innovations.variances[s], omegas[s], None
-        alpha, gain = gains.alphas[s], gains.sharp_min_gain
+        alpha, gain = gains.alphas[s], gains.glossy_gain
         if kind is SignalKind.DIFFUSE:
             certain = certainty(smoothed.diffuse_spread, dr.square(wide.luminance),
                                 gains.noise_threshold)

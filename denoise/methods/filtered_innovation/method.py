@@ -102,7 +102,9 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             all of it where frames have albedo and no visibility [1, 1e-6 to 1].
         noise_threshold: a smoothed innovation whose square is below this many of its variances
             is taken for noise [variances, 0 to 1e6].
-        sharp_min_gain: as `min_gain`, of visibility and glossy light [1, 1e-6 to 1].
+        sharp_min_gain: as `min_gain`, of visibility [1, 1e-6 to 1].
+        glossy_gain: share of the smoothed innovation that the history of glossy light takes
+            [1, 1e-6 to 1].
         change_alpha: weight of the current frame in the high frequencies of visibility where a
             change of the low ones is certain [1, 0 to 1].
         light_change: how soon a change forgets the history of diffuse light: the squared change
@@ -152,6 +154,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     min_gain: float = 0.55
     noise_threshold: float = 4.0
     sharp_min_gain: float = 0.75
+    glossy_gain: float = 0.45
     change_alpha: float = 0.6
     light_change: float = 12.0
     glossy_change: float = 4.0
@@ -181,7 +184,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         for name, least in (("innovation_levels", ENERGY_LEVELS), ("output_levels", 1)):
             check_whole(self, name, LARGEST_LEVELS, least)
             check_whole(self, f"sharp_{name}", getattr(self, name), least)
-        for name in ("light_alpha", "visibility_alpha", "min_gain", "sharp_min_gain"):
+        for name in ("light_alpha", "visibility_alpha", "min_gain", "sharp_min_gain",
+                     "glossy_gain"):
             check_range(self, name, 1e-6, 1.0)
         check_range(self, "change_alpha", 0.0, 1.0)
         for name in ("noise_threshold", "light_change", "glossy_change", "visibility_change"):
@@ -308,7 +312,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         min_gain = self.min_gain if lags else 1.0
         return Gains([stencil.opaque(alpha) for alpha in alphas], stencil.opaque(min_gain),
                      stencil.opaque(self.noise_threshold), stencil.opaque(self.sharp_min_gain),
-                     stencil.opaque(self.change_alpha), stencil.opaque(self.fade_frames),
+                     stencil.opaque(self.glossy_gain), stencil.opaque(self.change_alpha),
+                     stencil.opaque(self.fade_frames),
                      [stencil.opaque(change[kind]) for kind in layout.kinds])
 
     def _sigmas(self, stencil: Stencil, layout: SignalLayout) -> list[Float]:
