@@ -6,12 +6,16 @@ import signal
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 import onespp
 from onespp.cli import app
 from onespp.datasets.folder import DataSet
 from onespp.render.cli.terminal import run as run_command
 from tests.support.places import GAMES202
+
+settings.register_profile("untimed", deadline=None)  # machines are shared
+settings.load_profile("untimed")
 
 
 @pytest.fixture(scope="session")

@@ -32,7 +32,7 @@ from tests.support.small_sequence import (
     small_sequence,
 )
 
-fuzz = settings(max_examples=150, deadline=None,
+fuzz = settings(max_examples=150,
                 suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 

@@ -37,7 +37,7 @@ def velocity(function, frame, side, step=1e-5):
 
 @pytest.mark.parametrize("ease", EASES)
 @given(keyframes)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_track_passes_through_its_keys_and_holds_outside(ease, keys):
     value = track(keys, ease)
     for frame, key in keys.items():
@@ -48,7 +48,7 @@ def test_track_passes_through_its_keys_and_holds_outside(ease, keys):
 
 
 @given(keyframes, st.floats(0, 1))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_linear_track_equals_interpolation(keys, u):
     frame = min(keys) + u * (max(keys) - min(keys))
     expected = np.interp(frame, list(keys), list(keys.values()))
@@ -129,7 +129,7 @@ def test_spline_orientation_has_continuous_velocity(loop):
 
 
 @given(st.lists(st.floats(-1.8, 1.8), min_size=3, max_size=3))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_quaternion_log_inverts_exp_and_agrees_with_rodrigues(vector):
     vector = np.array(vector)  # at most 3.12 long: less than half a turn
     q = quaternions.exp(vector)

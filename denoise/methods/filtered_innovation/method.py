@@ -154,7 +154,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     min_gain: float = 0.55
     noise_threshold: float = 4.0
     sharp_min_gain: float = 0.75
-    glossy_gain: float = 0.45
+    glossy_gain: float = 0.6
     change_alpha: float = 0.6
     light_change: float = 12.0
     glossy_change: float = 4.0

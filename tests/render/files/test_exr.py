@@ -28,7 +28,7 @@ def planes(height: int = 33, width: int = 20, seed: int = 0) -> dict[str, np.nda
 
 @given(st.sampled_from([np.float32, np.float16, np.uint32]).flatmap(
     lambda kind: arrays(kind, st.tuples(st.integers(1, 40), st.integers(1, 7)))))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_every_value_comes_back_bit_for_bit(tmp_path_factory, image):
     path = tmp_path_factory.mktemp("exr") / "a.exr"
     write_exr(path, {"Z": image})
