@@ -22,6 +22,7 @@ from onespp.denoise.jit.taps import Offset, Taps, window
 
 BINOMIAL = {0: 1 / 2, 1: 1 / 4}
 OTHER_OBJECT_WEIGHT = 0.4      # of a pixel of another object, beside its distance
+_APART = 1e15                  # distance of what is not the same surface
 
 
 class SurfaceTap(NamedTuple):
@@ -29,8 +30,6 @@ class SurfaceTap(NamedTuple):
 
     inverse_depth: Float
     id: Float
-
-_APART = 1e15  # distance of what is not the same surface
 
 
 def loosened(surfaces: Taps[SurfaceTap], plane: TangentPlane) -> TangentPlane:

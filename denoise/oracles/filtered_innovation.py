@@ -143,7 +143,7 @@ def width_of(frame: Frame) -> float:
     """Of a pixel at depth 1."""
     b = np.linalg.inv((frame.screen_from_world
                        @ np.linalg.inv(frame.camera_from_world))[[0, 1, 3], :3])
-    return np.sqrt(np.linalg.norm(np.cross(b[:, 0], b[:, 1])[2:]))
+    return np.sqrt(np.abs(np.linalg.det(b[:2, :2])))
 
 
 def roughness_around(frame: Frame) -> np.ndarray:

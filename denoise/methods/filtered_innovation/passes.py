@@ -24,14 +24,13 @@ from .layout import NoisySignal, PlaneRule, SignalLayout, Smoothed
 from .merging import Merged, merge
 from .output import FEWEST_SAMPLES, OutputFalloff, output_level
 from .shadows import Shadows, follow_shadows, of_each_light
-from .smoothing import smooth_level
+from .smoothing import fill_level, smooth_level
 from .texture import CHOICE_RULES, RESIDUAL_RULES, Residual, residual, restored
 
 _OUTSIDE = -1e15          # 1/z outside the image
 _ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH = range(3)  # planes of the surface
 _SHADOW_PLANES = 5        # of `Shadows`
 _AROUND = [*window(1), (0, 0)]
-_LIT_RULES = [PlaneRule(1)] * 2
 T = TypeVar("T")
 
 
@@ -65,7 +64,7 @@ class Passes:
     Attributes:
         surfaces: planes of object ID, 1/z, and 1/z of what has a history.
         buffer: planes of what is being smoothed or filtered, see `layout.py`.
-        around: surfaces of the 3x3 pixels around. lit: smoothing of what unlit pixels are given.
+        around: surfaces of the 3x3 pixels around. fill: of unlit pixels' visibility.
     """
 
     stencil: Stencil
@@ -74,8 +73,7 @@ class Passes:
     buffer: Planes
     around: Taps[SurfaceTap]
     loosen: Step[..., TangentPlane]
-    lit: Level
-    give: Step[..., Float]
+    fill: Level
     follow_shadows: Step[..., list[Shadows]]
     spread: Level
     find_innovations: Step[..., Innovations]
@@ -94,7 +92,6 @@ class Passes:
         surfaces = stencil.planes([-1.0, _OUTSIDE, _OUTSIDE])
         spread = [PlaneRule(SPREAD_LEVEL)] * (_SHADOW_PLANES * (layout.groups or 1))
         buffer = stencil.planes([0.0] * max(len(layout.smoothing_rules), len(spread),
-                                            len(_LIT_RULES),
                                             layout.output_planes(layout.output_level(0))))
 
         def smoothing(i: int) -> Level:
@@ -120,9 +117,7 @@ class Passes:
             stencil, layout, surfaces, buffer,
             surfaces.taps(_AROUND, [_INVERSE_DEPTH, _ID]).named(SurfaceTap),
             Step(loosened),
-            Level.make(0, buffer, len(_LIT_RULES), surfaces, _INVERSE_DEPTH,
-                       lambda *a: smooth_level(_LIT_RULES, *a)),
-            Step(given_by_neighbours),
+            Level.make(0, buffer, 2, surfaces, _INVERSE_DEPTH, fill_level),
             Step(lambda chosen, *a: of_each_light(follow_shadows(stencil, *a), chosen,
                                                   layout.groups)),
             Level.make(SPREAD_LEVEL, buffer, len(spread), surfaces, _INVERSE_DEPTH,
@@ -152,9 +147,8 @@ class Passes:
         nothing is known of it, such as on the back of a leaf, it gets what its neighbours have, of
         which it would else take some away."""
         *others, visibility = signals
-        around = self._through([self.lit], [visibility.luminance, lit], plane)
-        known = self.give(visibility.luminance, lit, *around)
-        return [*others, visibility._replace(luminance=known)]
+        filled, _ = self._through([self.fill], [visibility.luminance, lit], plane)
+        return [*others, visibility._replace(luminance=filled)]
 
     def spread_shadows(self, rays: ShadowRays | None, surface: SurfaceSample, position: Vector3,
                        plane: TangentPlane, chosen: Chosen | None) -> list[Shadows]:
@@ -204,15 +198,6 @@ class Passes:
             planes[:level.count] = level.step(level.values, level.surfaces, plane, level.spacing,
                                               *arguments)
         return build(form, planes)
-
-
-def given_by_neighbours(value: Float, is_known: Float, around: Float, share: Float) -> Float:
-    """A value, where it is not known that of the neighbours that know it, if any do.
-
-    around, share: means over the neighbours of what is known, else 0, and of whether it is.
-    """
-    given = (is_known == 0) & (share > 0)
-    return dr.select(given, around / dr.select(given, share, 1), value)
 
 
 def _counted(noisy: NoisySignal) -> NoisySignal:

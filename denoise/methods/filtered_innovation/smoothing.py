@@ -50,6 +50,21 @@ def smooth_level(rules: Sequence[PlaneRule], values: Taps[list[Float]], surfaces
     return [f * s for f, s in zip(each(*[1 / total for total in totals]), sums)]
 
 
+def fill_level(values: Taps[list[Float]], surfaces: Taps[SurfaceTap], plane: TangentPlane,
+               spacing: Float) -> list[Float]:
+    """A plane, where it is not known the mean of the neighbours that know it, if any do.
+
+    Args:
+        values: the plane, 0 where it is not known, and whether it is. Others as of `smooth_level`.
+    Returns:
+        both planes, the second as it was.
+    """
+    around, share = smooth_level([PlaneRule(1)] * 2, values, surfaces, plane, spacing)
+    value, is_known = values.at(-1)
+    is_filled = (is_known == 0) & (share > 0)
+    return [dr.select(is_filled, around / dr.select(is_filled, share, 1), value), is_known]
+
+
 def footprint(falloff: Float | None, spacing: Float) -> Callable[[Float, Offset], Float]:
     """Function of (x, offset): log2 x of a weight, less the more the farther a tap is.
 
