@@ -87,7 +87,7 @@ def _rgb(layer: str) -> tuple[str, ...]:
 
 MOST_GROUPS = 4  # of lights, each with a visibility of its own
 SUN = -2  # `light_id` of the environment's brightest spot, where it is a light of its own
-TRACING = 3
+TRACING = 4
 """Counts the changes of what frames hold. Raise it whenever the same scene, frame and seed give
 other values than rounding explains in any channel, of frames or references: sequences and data sets
 begun before are then not continued. One number serves both, since what changes the mean of light
@@ -96,6 +96,7 @@ changes both, and more than one would let a folder hold frames that its referenc
 2: the first surface behind mirrors, clear glass and masks is the pixel's (`tracer/replacement.py`);
 under half-open masks mirrors and glass show lamps; the sun of a sky is a light (`lights/sun.py`).
 3: lamps in other layers of glass and masks have no noise (`tracer/layers.py`).
+4: of more than 64 lights fewer are cut, of more than 96 some speak for others (`clusters.py`).
 """
 
 _ROWS = (

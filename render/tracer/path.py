@@ -23,7 +23,8 @@ from onespp.render.mitsuba.variant import mi
 
 from .layers import is_straight
 from .lights.candidates import sought_light
-from .lights.resampling import DirectLight, Lights, power_heuristic, resample_lights, shape_index
+from .lights.resampling import DirectLight, Lights, resample_lights, shape_index
+from .lights.strata import power_heuristic
 from .replacement import Layer, Replaced
 from .sampler import Sampler, Sobol
 

@@ -25,8 +25,8 @@ import drjit as dr
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.sampler import Sampler
 
-from .resampling import power_heuristic
 from .reservoir import offered
+from .strata import power_heuristic
 
 GOLDEN = 0.6180339887498949  # fractional part; its multiples spread evenly over [0, 1)
 FEWEST, MOST = 2, 8

@@ -44,7 +44,9 @@ import drjit as dr
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.sampler import Sampler
 
+from .clusters import Clusters, light_of_cluster
 from .reservoir import offered
+from .strata import light_point
 from .sun import SUN_BIT, Sun
 
 DELTA = 0.1
@@ -56,13 +58,15 @@ class Lights:
     """All strata of a scene's lights, in the order of `scene.emitters()`, the sun's last.
 
     stratum: which part of which light it is (`stratum_word`). group: that it is in. sizes: strata
-    in each group, none where all lights are one. sun: None where there is none.
+    in each group, none where all lights are one. sun: None where there is none. clusters: of each
+    stratum, None where no light speaks for others.
     """
 
     stratum: mi.UInt32
     group: mi.UInt32
     sizes: tuple[int, ...]
     sun: Sun | None = None
+    clusters: Clusters | None = None
 
 
 @dataclass
@@ -127,10 +131,13 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     k = mi.UInt32(0)
     while dr.hint(k < strata, max_iterations=strata, label="lights"):
         stratum = dr.gather(mi.UInt32, lights.stratum, k, active)
-        c, light = contribution(scene, si, stratum, mi.Point2f(0.5), active, lights.sun)
+        middle = light_point(scene, si, stratum, mi.Point2f(0.5), active, lights.sun)
+        c = mi.Color3f(middle.c)
+        if dr.hint(lights.clusters is not None, mode="scalar"):
+            c *= dr.gather(mi.Float, lights.clusters.scale, k, active)
         unshadowed += c
         if dr.hint(len(lights.sizes) > 0, mode="scalar"):
-            c = weight(si, light, emitters, active) * c
+            c = middle.weight(emitters) * c
             group = dr.gather(mi.UInt32, lights.group, k, active)
             by_group = added(by_group, group, c)
         luminance = mi.luminance(c)
@@ -145,20 +152,26 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     anywhere = dr.select(dark, choice, left / DELTA)
     picked = dr.select(uniform, dr.minimum(mi.UInt32(anywhere * strata), strata - 1), picked)
     stratum = dr.gather(mi.UInt32, lights.stratum, picked, active)
-    middle, light = contribution(scene, si, stratum, mi.Point2f(0.5), active & uniform,
-                                 lights.sun)
+    middle = light_point(scene, si, stratum, mi.Point2f(0.5), active & uniform, lights.sun)
+    of_middle = mi.Color3f(middle.c)
     if dr.hint(len(lights.sizes) > 0, mode="scalar"):
-        middle = weight(si, light, emitters, active & uniform) * middle
-    picked_luminance = dr.select(uniform, mi.luminance(middle), picked_luminance)
+        of_middle = middle.weight(emitters) * of_middle
+    if dr.hint(lights.clusters is not None, mode="scalar"):
+        of_middle *= dr.gather(mi.Float, lights.clusters.scale, picked, active)
+    picked_luminance = dr.select(uniform, mi.luminance(of_middle), picked_luminance)
     p = dr.select(dark, 1, (1 - DELTA) * strata * picked_luminance / total + DELTA) / strata
 
-    c, light = contribution(scene, si, stratum, jitter, active, lights.sun)
+    more = mi.Float(1)
+    if dr.hint(lights.clusters is not None, mode="scalar"):
+        stratum, more = light_of_cluster(lights.clusters, picked, scene, si, jitter,
+                                         sampler.next_2d(), active, lights.sun)
+    point = light_point(scene, si, stratum, jitter, active, lights.sun)
+    c, light = more * point.c, point.light
     lit = active & (dr.max(c) > 0)
     toward = si.spawn_ray_to(light.p)
     blocker = scene.ray_intersect_preliminary(toward, coherent=False, active=lit)
     shadowed = blocker.is_valid()
-    w = weight(si, light, emitters, lit)
-    direct = dr.select(lit & ~shadowed, w * c / p, 0)
+    direct = dr.select(lit & ~shadowed, point.weight(emitters) * c / p, 0)
     sample, to_sun = None, mi.Bool(False)
     if dr.hint(lights.sun is not None, mode="scalar"):
         to_sun = lit & ((stratum & SUN_BIT) != 0)
@@ -197,43 +210,3 @@ def group_sample(lights: Lights, unshadowed: list[mi.Color3f], group: mi.UInt32,
 def shape_index(shape: mi.ShapePtr, active: mi.Bool) -> mi.UInt32:
     """Index in the JIT registry, 0 where not `active`."""
     return dr.select(active, dr.reinterpret_array(mi.UInt32, shape), 0)
-
-
-def stratum_word(light: Any, halvings: Any, cell: Any) -> Any:
-    """A stratum in a word: a cell, row by row, of a light whose sides are halved so often.
-
-    light: 256 times the index of its emitter; of a sun `SUN_BIT` more.
-    """
-    return light + halvings * 16 + cell
-
-
-def contribution(scene: mi.Scene, si: mi.SurfaceInteraction3f, stratum: mi.UInt32,
-                 place: mi.Point2f, active: mi.Bool,
-                 sun: Sun | None) -> tuple[mi.Color3f, mi.DirectionSample3f]:
-    """c_k at a place in a stratum, and the point of the light that it comes from."""
-    emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), stratum >> 8, active)
-    halvings, cell = (stratum >> 4) & 7, stratum & 15  # no division: idle lanes have all bits 0
-    row, side = cell >> halvings, mi.Float(1 << halvings)
-    sample = (mi.Point2f(cell - (row << halvings), row) + place) / side
-    light, weight = emitter.sample_direction(si, sample, active)
-    if sun is not None:
-        light, weight = sun.told_apart(scene, si, stratum, sample, light, weight, active)
-    value = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(light.d), active)
-    c = dr.select(active & (light.pdf > 0), value * weight, 0) / dr.square(side)
-    return c, light
-
-
-def weight(si: mi.SurfaceInteraction3f, light: mi.DirectionSample3f, emitters: int,
-           active: mi.Bool) -> mi.Float:
-    """Of multiple importance sampling, for a point of a light, as plain light sampling has it."""
-    bsdf_pdf = si.bsdf().pdf(mi.BSDFContext(), si, si.to_local(light.d), active)
-    return dr.select(light.delta, 1, power_heuristic(light.pdf / emitters, bsdf_pdf))
-
-
-def power_heuristic(p: mi.Float, q: mi.Float) -> mi.Float:
-    """Power heuristic weight of a sample drawn with density p where q could have drawn it too.
-
-    Source: Veach 1997, section 9.2.2, exponent 2. Infinite or zero densities give 1 or 0.
-    """
-    w = dr.square(p) / (dr.square(p) + dr.square(q))
-    return dr.select(p > 0, dr.select(dr.isfinite(w), w, 1), 0)

@@ -2,10 +2,10 @@
 
 **Strata.** Up to `FEW` lights are cut into 4 x 4 strata each. Where there are more, each is cut
 into one at first, and those that give most for each of their strata, as a mean over points of the
-scene, are cut more finely while there are strata left: at most `MOST_STRATA`, or `SPARE` beside one
-for each light. So a pixel costs what it costs with a few lights, and the sky or a large lamp among
-many small ones keeps its 16. A light at a point or from one direction has one. The sun of a sky is
-a light (`sun.py`).
+scene, are cut more finely while there are strata left, `MOST_STRATA` in all. So a pixel costs what
+it costs with a few lights, and the sky or a large lamp among many small ones keeps its 16. A light
+at a point or from one direction has one. The sun of a sky is a light (`sun.py`). Of more than
+`MOST_CLUSTERS` lights some speak for others (`clusters.py`), and a cluster has one stratum.
 
 **Groups.** Those of one group seldom shine on the same place: a visibility for each group is noise
 only where two of its lights meet. With u_e the luminance that light e would give a point of the
@@ -30,12 +30,13 @@ from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.camera_rays import pixel_rays
 
-from .resampling import Lights, contribution, stratum_word
+from .clusters import MOST_CLUSTERS, Clusters, clustered
+from .resampling import Lights
+from .strata import light_point, stratum_word
 from .sun import SUN_BIT, Sun, find_sun
 
 FEW = 8
 MOST_STRATA = 128
-SPARE = 64
 
 _HEIGHT, _WIDTH = 18, 32
 _FRAMES = 4  # of the scene that are looked at
@@ -50,20 +51,39 @@ def find_lights(stage: MitsubaScene) -> Lights:
     lights, count = 256 * np.arange(len(emitters)), len(delta)
     if sun is not None:
         lights = np.append(lights, lights[sun.emitter.numpy()[0]] + SUN_BIT)
-    halvings, groups = np.where(delta, 0, 2), np.arange(count)
+    clusters = [(np.array([e]), 1.0) for e in range(count)]
+    luminances = np.zeros((count, 0))
     if count > min(FEW, MOST_GROUPS):
         last = stage.description.frames - 1
         at = sorted({round(last * i / (_FRAMES - 1)) for i in range(_FRAMES)})
         luminances = np.concatenate([_luminances(stage, i, lights, sun) for i in at], axis=1)
-        if count > MOST_GROUPS:
-            groups = share_out(luminances)
-        if count > FEW:
-            halvings = cut(luminances, delta)
-    words = [stratum_word(e, n, cell) for e, n in zip(lights, halvings) for cell in range(4**n)]
+    if count > MOST_CLUSTERS:
+        shares = luminances / np.maximum(luminances.sum(0), 1e-30)
+        endless = np.array([e.is_environment() for e in emitters] + [True] * (sun is not None))
+        clusters = clustered(shares, endless, MOST_CLUSTERS)
+        luminances = np.stack([luminances[e].sum(0) for e, _ in clusters])
+    return _in_strata(lights, clusters, luminances, delta, sun)
+
+
+def _in_strata(lights: np.ndarray, clusters: list[tuple[np.ndarray, float]],
+               luminances: np.ndarray, delta: np.ndarray, sun: Sun | None) -> Lights:
+    """Lights from words without cells, of `clustered`, with (clusters, points) luminances, if these
+    are known; delta: of lights."""
+    count = len(clusters)
+    whole = np.array([len(e) > 1 or delta[e[0]] for e, _ in clusters])
+    halvings = np.where(whole, 0, 2) if count <= FEW else cut(luminances, whole)
+    groups = np.arange(count) if count <= MOST_GROUPS else share_out(luminances)
+    words = [[stratum_word(lights[e], n, cell) for cell in range(4**n)]
+             for (e, _), n in zip(clusters, halvings)]
+    first = [word[0] for of_cluster in words for word in of_cluster]
     group = np.repeat(groups, 4**halvings)
     sizes = np.bincount(group) if count > 1 else ()
-    return Lights(aligned(mi.UInt32, np.array(words, np.uint32)),
-                  aligned(mi.UInt32, group.astype(np.uint32)), tuple(map(int, sizes)), sun)
+    speaking = None
+    if count < len(lights):
+        speaking = Clusters.of([word for of_cluster in words for word in of_cluster],
+                               np.repeat([s for _, s in clusters], 4**halvings))
+    return Lights(aligned(mi.UInt32, np.array(first, np.uint32)), aligned(mi.UInt32, group.astype(
+        np.uint32)), tuple(map(int, sizes)), sun, speaking)
 
 
 def cut(luminances: np.ndarray, delta: np.ndarray) -> np.ndarray:
@@ -75,7 +95,7 @@ def cut(luminances: np.ndarray, delta: np.ndarray) -> np.ndarray:
     """
     given = (luminances / np.maximum(luminances.sum(0), 1e-30)).mean(1)
     halvings = np.zeros(len(given), int)
-    left = max(MOST_STRATA - len(given), SPARE)
+    left = MOST_STRATA - len(given)
     while True:
         strata = 4**halvings
         finer = np.where(~delta & (halvings < 2) & (3 * strata <= left), given / strata, 0)
@@ -125,7 +145,7 @@ def _luminances(stage: MitsubaScene, index: int, lights: np.ndarray,
         si = scene.ray_intersect(ray)
         total = mi.Float(0)
         for cell in (5, 6, 9, 10):  # the middle of the light
-            c, _ = contribution(scene, si, stratum_word(light, 2, cell), mi.Point2f(0.5),
+            point = light_point(scene, si, stratum_word(light, 2, cell), mi.Point2f(0.5),
                                 si.is_valid(), sun)
-            total += mi.luminance(c)
+            total += mi.luminance(point.c)
     return total.numpy().astype(np.float64).reshape(len(lights), points)

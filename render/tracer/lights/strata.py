@@ -1,0 +1,62 @@
+"""A point of a light, in a stratum: what it gives where nothing is in its way, and its weight.
+
+A stratum is a cell of an emitter's sample square, or all of it. The weights are those of plain
+light sampling against the BSDF's (Veach 1997, section 9.2.2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+
+from onespp.render.mitsuba.variant import mi
+
+from .sun import Sun
+
+
+@dataclass
+class LightPoint:
+    """c, the contribution of a point of a light; the point; and the BSDF's density toward it."""
+
+    c: mi.Color3f
+    light: mi.DirectionSample3f
+    bsdf_pdf: mi.Float
+
+    def weight(self, emitters: int) -> mi.Float:
+        """Of multiple importance sampling, as plain light sampling has it."""
+        light = self.light
+        return dr.select(light.delta, 1, power_heuristic(light.pdf / emitters, self.bsdf_pdf))
+
+
+def stratum_word(light: Any, halvings: Any, cell: Any) -> Any:
+    """A stratum in a word: a cell, row by row, of a light whose sides are halved so often.
+
+    light: 256 times the index of its emitter; of a sun `SUN_BIT` (`sun.py`) more.
+    """
+    return light + halvings * 16 + cell
+
+
+def light_point(scene: mi.Scene, si: mi.SurfaceInteraction3f, stratum: mi.UInt32,
+                place: mi.Point2f, active: mi.Bool, sun: Sun | None) -> LightPoint:
+    """At a place in a stratum, toward `si.wi`."""
+    emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), stratum >> 8, active)
+    halvings, cell = (stratum >> 4) & 7, stratum & 15  # no division: idle lanes have all bits 0
+    row, side = cell >> halvings, mi.Float(1 << halvings)
+    sample = (mi.Point2f(cell - (row << halvings), row) + place) / side
+    light, weight = emitter.sample_direction(si, sample, active)
+    if sun is not None:
+        light, weight = sun.told_apart(scene, si, stratum, sample, light, weight, active)
+    value, pdf = si.bsdf().eval_pdf(mi.BSDFContext(), si, si.to_local(light.d), active)
+    c = dr.select(active & (light.pdf > 0), value * weight, 0) / dr.square(side)
+    return LightPoint(c, light, pdf)
+
+
+def power_heuristic(p: mi.Float, q: mi.Float) -> mi.Float:
+    """Power heuristic weight of a sample drawn with density p where q could have drawn it too.
+
+    Source: Veach 1997, section 9.2.2, exponent 2. Infinite or zero densities give 1 or 0.
+    """
+    w = dr.square(p) / (dr.square(p) + dr.square(q))
+    return dr.select(p > 0, dr.select(dr.isfinite(w), w, 1), 0)
