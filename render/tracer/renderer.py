@@ -57,7 +57,8 @@ class Renderer(View):
 
     @turn()
     def frame(self, index: int, seed: int = 0, channels: Sequence[str] = FRAME) -> Frame:
-        """One frame at 1 spp: one kernel, only the channels asked for.
+        """One frame at 1 spp: one kernel, only the channels asked for; then a small one a colour,
+        which lays its planes side by side.
 
         The result depends on (scene, index, seed, size) alone, and never on which other frames
         are rendered: the channels of `replay.py` replay frame `index` - 1, whether or not it is
@@ -203,7 +204,7 @@ class Renderer(View):
     def _image(self, value: object) -> np.ndarray:
         """(h, w) or (h, w, 3) NumPy copy of evaluated planes."""
         size = (self.height, self.width)
-        parts: Any = value if dr.depth_v(value) > 1 else [value]
-        planes = [np.broadcast_to(plane.numpy(), self.height * self.width).reshape(size)
-                  for plane in parts]
-        return np.stack(planes, -1) if len(planes) > 1 else planes[0].copy()
+        planes: Any = value
+        if dr.depth_v(planes) > 1:  # by all threads, which np.stack is not
+            return dr.ravel(planes).numpy().reshape(*size, -1)
+        return np.broadcast_to(planes.numpy(), self.height * self.width).reshape(size).copy()
