@@ -14,6 +14,10 @@ a light for. A level of `innovation.py` weighs a tap of visibility, r pixels awa
 p a parameter and q the mean of 1 / (w^2 + 1) over the rays around that were stopped. Contact
 shadows stay sharp, whatever the noise; where nothing is in the light's way, q is 0.
 
+Rays to one of several groups of lights are few, and near a contact those that were stopped may all
+have gone to others. What stands in the way of one light is likely to be in that of another: q of a
+group is at least three tenths of that of all rays. Our own.
+
 Source: Mehta et al. 2012, "Axis-Aligned Filtering for Interactive Sampled Soft Shadows", which
 takes the extremes of d around a pixel, not a mean, and filters by this width alone.
 """
@@ -27,6 +31,8 @@ import drjit as dr
 from onespp.denoise.jit.arrays import Bool, Float
 from onespp.denoise.jit.grid import Stencil
 from onespp.render.channels import SUN
+
+_OF_ALL = 0.3                  # share of q of all rays that q of a group is at least
 
 
 class PenumbraSample(NamedTuple):
@@ -64,3 +70,15 @@ def footprint_falloff(around: PenumbraSample, scale: Float, min_share: float) ->
     shadowed = around.blocked > min_share
     return dr.select(shadowed,
                      scale * around.inverse_width / dr.select(shadowed, around.blocked, 1), 0)
+
+
+def footprint_falloffs(around: list[PenumbraSample], scale: Float,
+                       min_share: float) -> list[Float]:
+    """`footprint_falloff` of each group of lights."""
+    falloffs = [footprint_falloff(group, scale, min_share) for group in around]
+    if len(around) < 2:
+        return falloffs
+    together = PenumbraSample(sum(group.blocked for group in around),
+                              sum(group.inverse_width for group in around))
+    least = _OF_ALL * footprint_falloff(together, scale, min_share)
+    return [dr.maximum(falloff, least) for falloff in falloffs]

@@ -454,7 +454,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict
         parts, out = {}, {}
         for name, d in signals.items():
             _, smoothing, *_, p = settings.get(name, visible)
-            sparse = name.isdigit()
+            sparse, groups = name.isdigit(), [n for n in signals if n.isdigit()]
             told = frame["group"] == int(name) if sparse else np.ones(found.shape, bool)
             omega = told * frame["group_sample"][..., 1].astype(float) if sparse else 1.0 * told
             follows = m.follow_shadows and "light" in frame and (
@@ -472,6 +472,8 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict
                 e = np.where(found[..., None], d - omega[..., None] * h, 0)
                 energy = smooth(frame, lum(e)[..., None] ** 2, found, 2, m)[..., 0]
             narrow = narrowness(frame, told, m) if follows else np.zeros(found.shape)
+            if follows and len(groups) > 1:
+                narrow = np.maximum(narrow, 0.3 * narrowness(frame, frame["group"] >= 0, m))
             q = spread(frame, lum(e) ** 2, found, smoothing, m, narrow)
             wide = smooth(frame, e, found, smoothing, m, narrow=narrow)
             if previous is not None and follows:

@@ -65,7 +65,7 @@ from typing import NamedTuple
 
 import drjit as dr
 
-from onespp.denoise.filters.penumbra import footprint_falloff
+from onespp.denoise.filters.penumbra import footprint_falloffs
 from onespp.denoise.history.records import look_up, pack_records, record_words
 from onespp.denoise.history.reflections import Lobes, turned
 from onespp.denoise.history.reprojection import Motion, ReprojectionTests, locate
@@ -194,8 +194,8 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
             other, dr.select(moves, visibility, history[s].signal.luminance),
             dr.select(moves, variance, variances[s]), dr.square(other) - energies[s]))
     return Innovations(e, energies, lengths, variances, valid_inverse_depth, others,
-                       [footprint_falloff(shadow.penumbra, falloff_scale, MIN_SHARE)
-                        for shadow in shadows], sparse,
+                       footprint_falloffs([shadow.penumbra for shadow in shadows], falloff_scale,
+                                          MIN_SHARE), sparse,
                        None if lobes is None else turned(lobes, surface.normal, place), misses,
                        at_rest, spatial)
 
