@@ -420,6 +420,16 @@ def narrowness(frame: Frame, told: np.ndarray, m) -> np.ndarray:
     return np.where(share > 1e-3, around[..., 1] / np.maximum(share, 1e-3), 0) / (2 * m.penumbra**2)
 
 
+def contact(frame: Frame, m) -> np.ndarray:
+    """c / (2 p^2) from how far what stopped the rays around is from the surface."""
+    told = frame["group"] >= 0 if "group" in frame else True
+    stopped = told & (frame["id"] >= 0) & (frame["blocker_distance"] > 0)
+    focal = (frame.screen_from_world @ np.linalg.inv(frame.camera_from_world))[0, 0]
+    pixels = frame["blocker_distance"].astype(float) * focal / np.where(stopped, frame["depth"], 1)
+    c = np.where(stopped, 1 / (4 * pixels**2 + 1), 0)
+    return spread_out(frame, c[..., None], m)[..., 0] / (2 * m.penumbra**2)
+
+
 def run(frames: list[Frame], m) -> np.ndarray:
     """The colour of the last frame."""
     signals = [signals_of(frame) for frame in frames]
@@ -545,6 +555,8 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict
             if name == "G" and "roughness" in frame:
                 least = min(m.mirror_sigma / sigma, 1)
                 sigmas = sigma * np.clip(roughness_of(frame) / 0.1, least, 1)
+            if name in "LG" and "light" in frame and m.follow_shadows and len(signals) > 1:
+                narrow = {"L": 0.2, "G": 1}[name] * contact(frame, m)
             out[name] = guided(frame, history, s2, levels, sigmas, fade, narrow, m,
                                np.clip(samples, 1e-5, 1) if sparse else None,
                                {"L": 0.2, "G": 1.0}.get(name, 0))

@@ -29,7 +29,7 @@ from .texture import CHOICE_RULES, RESIDUAL_RULES, Residual, residual, restored
 
 _OUTSIDE = -1e15          # 1/z outside the image
 _ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH, _ROUGH = range(4)  # planes of the surface
-_SHADOW_PLANES = 5        # of `Shadows`
+_SHADOW_PLANES = 6        # of `Shadows`
 _AROUND = [*window(1), (0, 0)]
 T = TypeVar("T")
 
@@ -185,7 +185,7 @@ class Passes:
                       sigmas: list[Float], narrower: Float | None) -> list[Signal]:
         """The last filter of each signal; narrower: of `narrowed`."""
         falloff = OutputFalloff(merged.fades, merged.sparse_fades, innovations.footprint_falloffs,
-                                narrower)
+                                innovations.contact_falloff, narrower)
         before = [_counted(noisy) for noisy in merged.signals]
         if merged.parts is not None:
             before = [before[0]._replace(parts=merged.parts)]
