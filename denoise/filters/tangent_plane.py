@@ -4,7 +4,15 @@ Where a surface is rougher than pixels can show (leaves, grass) no two pixels sh
 nothing would be filtered. There a plane is worth less: with r the roughness, the least over the
 four lines through a pixel of the greater distance of its two neighbours on that line, and t the
 tolerated distance, slopes shrink by t / (t + r) and t grows to t + r. An edge, a crease or a bent
-surface is not rough: some line follows it. Our own.
+surface is not rough: some line follows it.
+
+Leaves of several objects, or lone ones, have no line of their own, as little as a corner of a box
+has, but are rough for some pixels around. With R the same among all pixels, whatever their object
+is, and m the mean of R / (t + R) at the eight pixels two away,
+
+    r <- max(r, clamp(4 m - 1, 0, 1) R).
+
+Our own.
 """
 
 from __future__ import annotations
@@ -22,6 +30,7 @@ from onespp.denoise.jit.taps import Offset, Taps, window
 
 BINOMIAL = {0: 1 / 2, 1: 1 / 4}
 OTHER_OBJECT_WEIGHT = 0.4      # of a pixel of another object, beside its distance
+RING = [(2 * dy, 2 * dx) for dy, dx in window(1)]
 _APART = 1e15                  # distance of what is not the same surface
 
 
@@ -32,17 +41,39 @@ class SurfaceTap(NamedTuple):
     id: Float
 
 
-def loosened(surfaces: Taps[SurfaceTap], plane: TangentPlane) -> TangentPlane:
-    """The planes as they count, given the 3x3 pixels around, of which the last is the pixel."""
-    center, distances = surfaces.at(-1), []
+class Roughness(NamedTuple):
+    """r / t, R / t and R / (t + R)."""
+
+    own: Float
+    any: Float
+    share: Float
+
+
+def roughness(surfaces: Taps[SurfaceTap], plane: TangentPlane) -> Roughness:
+    """Of each pixel, given the 3x3 pixels around, of which the last is the pixel."""
+    center, own, any_ = surfaces.at(-1), [], []
     for i, (dy, dx) in enumerate(window(1)):
         tap = surfaces.at(i)
         expected = dr.fma(plane.dx, float(dx), dr.fma(plane.dy, float(dy), center.inverse_depth))
-        same = (tap.id == center.id) & (tap.inverse_depth > 0) & (center.inverse_depth > 0)
-        distances.append(dr.select(same, dr.abs(tap.inverse_depth - expected), _APART))
+        there = (tap.inverse_depth > 0) & (center.inverse_depth > 0)
+        any_.append(dr.select(there, dr.abs(tap.inverse_depth - expected), _APART))
+        own.append(dr.select(tap.id == center.id, any_[-1], _APART))
+    of_own, of_any = (_least_line(distances) * plane.scale for distances in (own, any_))
+    return Roughness(of_own, of_any, of_any / (1 + of_any))
+
+
+def _least_line(distances: list[Float]) -> Float:
+    """Least over lines of the greater distance, 0 where none is whole."""
     lines = [dr.maximum(a, b) for a, b in zip(distances[:4], distances[:3:-1], strict=True)]
     rough = dr.minimum(dr.minimum(lines[0], lines[1]), dr.minimum(lines[2], lines[3]))
-    share = 1 / dr.fma(plane.scale, dr.select(rough < _APART, rough, 0), 1)
+    return dr.select(rough < _APART, rough, 0)
+
+
+def loosened(shares: Taps[Float], rough: Roughness, plane: TangentPlane) -> TangentPlane:
+    """The planes as they count; shares: R / (t + R) at `RING`, 0 outside the image."""
+    mean = sum(shares.at(i) for i in range(len(shares))) * (1 / len(shares))
+    among_leaves = dr.clip(dr.fma(mean, 4, -1), 0, 1)
+    share = 1 / (1 + dr.maximum(rough.own, among_leaves * rough.any))
     return TangentPlane(plane.inverse_depth, plane.dx * share, plane.dy * share,
                         plane.scale * share)
 

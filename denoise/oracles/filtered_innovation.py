@@ -131,12 +131,12 @@ def geometry(p: Pixels, q: Pixels, dy: int, dx: int, m) -> np.ndarray:
     return np.where(p.kind == q.kind, w, 0)
 
 
-def pixels_of(frame: Frame, **more: np.ndarray) -> Pixels:
+def pixels_of(frame: Frame, m, **more: np.ndarray) -> Pixels:
     eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
     return oracles.read(frame, kind=kind_of(frame), id=frame["id"],
                         foot=((frame["position"] - eye) * frame["normal"]).sum(-1),
                         width=np.full(frame["id"].shape, width_of(frame)),
-                        rough=roughness_around(frame), **more)
+                        rough=roughness_of_leaves(frame, m), **more)
 
 
 def width_of(frame: Frame) -> float:
@@ -146,7 +146,17 @@ def width_of(frame: Frame) -> float:
     return np.sqrt(np.abs(np.linalg.det(b[:2, :2])))
 
 
-def roughness_around(frame: Frame) -> np.ndarray:
+def roughness_of_leaves(frame: Frame, m) -> np.ndarray:
+    """Among pixels of one object, or of all where the pixels two away are rough, too."""
+    shape, rough = frame["id"].shape, roughness_around(frame, False)
+    share = rough / (rough + m.plane_pixels * width_of(frame))
+    around = np.pad(share, 2)
+    total = sum(around[y:y + shape[0], x:x + shape[1]] for y in (0, 2, 4) for x in (0, 2, 4))
+    among_leaves = np.clip(4 * (total - share) / 8 - 1, 0, 1)
+    return np.maximum(roughness_around(frame, True), among_leaves * rough)
+
+
+def roughness_around(frame: Frame, same_object: bool) -> np.ndarray:
     """Of the lines through a pixel, the least of how far its neighbours are from its plane."""
     shape = frame["id"].shape
     pixels, rough = oracles.read(frame, kind=kind_of(frame), id=frame["id"]), np.full(shape, np.inf)
@@ -156,7 +166,7 @@ def roughness_around(frame: Frame) -> np.ndarray:
             where, p, q = pairs(pixels, shape, sign * line[0], sign * line[1])
             distance = np.full(shape, np.inf)
             if where is not None:
-                same = (p.id == q.id) & (p.kind == 2) & (q.kind == 2)
+                same = (p.kind == 2) & (q.kind == 2) & ((p.id == q.id) | (not same_object))
                 distance[where] = np.where(same, plane_weight_distance(p, q), np.inf)
             farther = np.maximum(farther, distance)
         rough = np.minimum(rough, farther)
@@ -185,7 +195,7 @@ def smooth(frame: Frame, image: np.ndarray, counts: np.ndarray, levels: int, m,
     """S: levels over the pixels that count, taps weaker by exp(-narrow r^2)."""
     shape = frame["id"].shape
     for i in range(first, first + levels):
-        pixels = pixels_of(frame, x=image, counts=counts, narrow=narrow * np.ones(shape))
+        pixels = pixels_of(frame, m, x=image, counts=counts, narrow=narrow * np.ones(shape))
         total = np.zeros_like(image)
         weights = np.zeros((*shape, 1))
         for dy in (-1, 0, 1):
@@ -206,7 +216,7 @@ def spread(frame: Frame, energy: np.ndarray, counts: np.ndarray, levels: int, m,
     """Q: the variance of a smoothing whose pixels have these."""
     shape = frame["id"].shape
     for i in range(levels):
-        pixels = pixels_of(frame, x=energy, counts=counts, narrow=narrow)
+        pixels = pixels_of(frame, m, x=energy, counts=counts, narrow=narrow)
         total, weights = np.zeros(shape), np.zeros(shape)
         for dy in (-1, 0, 1):
             for dx in (-1, 0, 1):
@@ -231,7 +241,7 @@ def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, s
     counts = np.ones(shape) if counts is None else counts
     for i in range(levels):
         weaker = fade if i == levels - 1 else np.ones_like(fade)
-        pixels = pixels_of(frame, x=image, v=variance, fade=weaker, narrow=narrow, counts=counts,
+        pixels = pixels_of(frame, m, x=image, v=variance, fade=weaker, narrow=narrow, counts=counts,
                            sigma=sigma)
         total, squares, weights = np.zeros_like(image), np.zeros(shape), np.zeros(shape)
         alike = np.zeros(shape)
@@ -259,7 +269,7 @@ def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, s
 def sample_variance(frame: Frame, samples: np.ndarray, there: np.ndarray, m) -> np.ndarray:
     """Variance of the samples around that are there, near p's plane; 1/4 of less than two."""
     shape = frame["id"].shape
-    pixels = pixels_of(frame, x=samples, there=1.0 * there)
+    pixels = pixels_of(frame, m, x=samples, there=1.0 * there)
     count, first, second = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     for dy, dx in np.ndindex(5, 5):
         where, p, q = pairs(pixels, shape, dy - 2, dx - 2)
@@ -277,7 +287,7 @@ def sample_variance(frame: Frame, samples: np.ndarray, there: np.ndarray, m) -> 
 def spatial_variance(frame: Frame, signal: np.ndarray, m) -> np.ndarray:
     """Mean square of what a 3x3 smoothing takes away, at pixels near p's plane."""
     shape = frame["id"].shape
-    pixels = pixels_of(frame, x=lum(signal))
+    pixels = pixels_of(frame, m, x=lum(signal))
     taps = {}
     for dy, dx in np.ndindex(5, 5):
         value, near = np.zeros(shape), np.zeros(shape, bool)
@@ -362,7 +372,7 @@ def shadow_history(previous: Frame, frame: Frame, told: np.ndarray, image: np.nd
     around = spread_out(frame, np.concatenate([moves, np.where(moves, shift, 0)], -1), m)
     near = (around[..., 0] > 1e-3) & (kind_of(frame) == 2)  # a lamp has no shadow
     shift = np.where(near[..., None], around[..., 1:] / np.maximum(around[..., :1], 1e-3), 0)
-    moved = on_tangent_planes(frame, shift, near, share_of(pixels_of(frame), m))
+    moved = on_tangent_planes(frame, shift, near, share_of(pixels_of(frame, m), m))
     history, found = look_up(previous, moved, image, m)
     return history, found & near
 
@@ -410,6 +420,16 @@ def narrowness(frame: Frame, told: np.ndarray, m) -> np.ndarray:
     return np.where(share > 1e-3, around[..., 1] / np.maximum(share, 1e-3), 0) / (2 * m.penumbra**2)
 
 
+def contact(frame: Frame, m) -> np.ndarray:
+    """c / (2 p^2) from how far what stopped the rays around is from the surface."""
+    told = frame["group"] >= 0 if "group" in frame else True
+    stopped = told & (frame["id"] >= 0) & (frame["blocker_distance"] > 0)
+    focal = (frame.screen_from_world @ np.linalg.inv(frame.camera_from_world))[0, 0]
+    pixels = frame["blocker_distance"].astype(float) * focal / np.where(stopped, frame["depth"], 1)
+    c = np.where(stopped, 1 / (4 * pixels**2 + 1), 0)
+    return spread_out(frame, c[..., None], m)[..., 0] / (2 * m.penumbra**2)
+
+
 def run(frames: list[Frame], m) -> np.ndarray:
     """The colour of the last frame."""
     signals = [signals_of(frame) for frame in frames]
@@ -444,7 +464,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict
         parts, out = {}, {}
         for name, d in signals.items():
             _, smoothing, *_, p = settings.get(name, visible)
-            sparse = name.isdigit()
+            sparse, groups = name.isdigit(), [n for n in signals if n.isdigit()]
             told = frame["group"] == int(name) if sparse else np.ones(found.shape, bool)
             omega = told * frame["group_sample"][..., 1].astype(float) if sparse else 1.0 * told
             follows = m.follow_shadows and "light" in frame and (
@@ -462,6 +482,8 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict
                 e = np.where(found[..., None], d - omega[..., None] * h, 0)
                 energy = smooth(frame, lum(e)[..., None] ** 2, found, 2, m)[..., 0]
             narrow = narrowness(frame, told, m) if follows else np.zeros(found.shape)
+            if follows and len(groups) > 1:
+                narrow = np.maximum(narrow, 0.3 * narrowness(frame, frame["group"] >= 0, m))
             q = spread(frame, lum(e) ** 2, found, smoothing, m, narrow)
             wide = smooth(frame, e, found, smoothing, m, narrow=narrow)
             if previous is not None and follows:
@@ -533,6 +555,8 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict
             if name == "G" and "roughness" in frame:
                 least = min(m.mirror_sigma / sigma, 1)
                 sigmas = sigma * np.clip(roughness_of(frame) / 0.1, least, 1)
+            if name in "LG" and "light" in frame and m.follow_shadows and len(signals) > 1:
+                narrow = {"L": 0.2, "G": 1}[name] * contact(frame, m)
             out[name] = guided(frame, history, s2, levels, sigmas, fade, narrow, m,
                                np.clip(samples, 1e-5, 1) if sparse else None,
                                {"L": 0.2, "G": 1.0}.get(name, 0))

@@ -49,7 +49,8 @@ of h compares luminance too,
 
 sigma being less for glossy light the narrower its lobe is, down to a mirror's at roughness 0,
 and its last level fades out as the history grows. A pixel of another object counts for two fifths.
-Visibility is filtered no farther than shadows are soft, and so are its e and Q: `penumbra.py`.
+Visibility is filtered no farther than shadows are soft, and so are its e and Q, and near a contact
+the last filter of other light is narrower: `penumbra.py`.
 Normals are not compared: where they differ much the tangent plane is soon left, and at a crease, or
 on a leaf, a neighbour turned away is a better guess than one sample (+0.2 to 0.9 dB for
 normal_power 0 instead of 4 and 128).
@@ -65,7 +66,7 @@ from typing import NamedTuple
 
 import drjit as dr
 
-from onespp.denoise.filters.penumbra import footprint_falloff
+from onespp.denoise.filters.penumbra import contact_falloff, footprint_falloffs
 from onespp.denoise.history.records import look_up, pack_records, record_words
 from onespp.denoise.history.reflections import Lobes, turned
 from onespp.denoise.history.reprojection import Motion, ReprojectionTests, locate
@@ -116,6 +117,7 @@ class Innovations(NamedTuple):
         shadows: of the other history of each visibility that has one. footprint_falloffs: of
             `penumbra.py`, of each of those. sparse: of each sparse signal. turned: t of
             `reflections.py`, None where the lobes of glossy light are not known.
+        contact_falloff: of `penumbra.py`, None where there are no shadow rays.
         misses: what reprojection may miss of texture, see `texture.py`; at_rest: of that module;
             spatial: of `noise.py`, of such light.
     """
@@ -132,6 +134,7 @@ class Innovations(NamedTuple):
     misses: Float | None = None
     at_rest: AtRest | None = None
     spatial: Float | None = None
+    contact_falloff: Float | None = None
 
 
 def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signal],
@@ -193,11 +196,12 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
         others.append(ShadowInnovation(
             other, dr.select(moves, visibility, history[s].signal.luminance),
             dr.select(moves, variance, variances[s]), dr.square(other) - energies[s]))
+    penumbras = [shadow.penumbra for shadow in shadows]
     return Innovations(e, energies, lengths, variances, valid_inverse_depth, others,
-                       [footprint_falloff(shadow.penumbra, falloff_scale, MIN_SHARE)
-                        for shadow in shadows], sparse,
+                       footprint_falloffs(penumbras, falloff_scale, MIN_SHARE), sparse,
                        None if lobes is None else turned(lobes, surface.normal, place), misses,
-                       at_rest, spatial)
+                       at_rest, spatial,
+                       contact_falloff(penumbras, falloff_scale) if penumbras else None)
 
 
 def choose_histories(layout: SignalLayout, innovations: Innovations,

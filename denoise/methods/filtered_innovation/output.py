@@ -24,17 +24,20 @@ FEWEST_SAMPLES = 1e-5          # that a sparse signal's pixel counts for where i
 WIDE_LOBE = 0.1                # roughness: such a lobe blurs an image as far as the filter does
 NEIGHBOURS_NOISE = {           # share of a noisier neighbour's variance beyond the pixel's own
     SignalKind.DIFFUSE: 0.2, SignalKind.GLOSSY: 1.0, SignalKind.VISIBILITY: 0.0}
+CONTACT = {SignalKind.DIFFUSE: 0.2, SignalKind.GLOSSY: 1.0}  # k of `penumbra.py`
 _NEVER = -1e3                  # log2 of a weight that is 0
 
 
 class OutputFalloff(NamedTuple):
     """What weakens the taps of the last filter: `fade_out` of its last level, of each signal that
     is not sparse and of each that is, `penumbra.footprint_falloff` of each visibility that shadow
-    rays tell of, and by what sigma of glossy light is divided, of `narrowed`."""
+    rays tell of, `penumbra.contact_falloff` where there are such rays, and by what sigma of glossy
+    light is divided, of `narrowed`."""
 
     fades: list[Float]
     sparse_fades: list[Float]
     footprints: list[Float]
+    contact: Float | None
     narrowed: Float | None
 
 
@@ -112,7 +115,10 @@ class _Rule(NamedTuple):
            spacing: Float) -> _Rule:
         f, g = layout.follower(s), layout.group(s)
         fade = falloff.fades[s] if g is None else falloff.sparse_fades[g]
-        return _Rule(footprint(None if f is None else falloff.footprints[f], spacing),
+        near = None if f is None else falloff.footprints[f]
+        if falloff.contact is not None and layout.kinds[s] in CONTACT:
+            near = CONTACT[layout.kinds[s]] * falloff.contact
+        return _Rule(footprint(near, spacing),
                      fade if layout.is_last_level(s, level) else None,
                      NEIGHBOURS_NOISE[layout.kinds[s]])
 

@@ -8,13 +8,13 @@ from typing import Any, TypeVar
 
 import drjit as dr
 
-from onespp.denoise.filters.tangent_plane import SurfaceTap, loosened
+from onespp.denoise.filters.tangent_plane import RING, Roughness, SurfaceTap, loosened, roughness
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
 from onespp.denoise.inputs.shadow_rays import ShadowRays
 from onespp.denoise.inputs.signals import Chosen, Signal
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Float, Vector3
-from onespp.denoise.jit.grid import Planes, Stencil
+from onespp.denoise.jit.grid import Planes, Stencil, single
 from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import arrays_of, build, flatten
 from onespp.denoise.jit.taps import Taps, window
@@ -28,8 +28,8 @@ from .smoothing import fill_level, smooth_level
 from .texture import CHOICE_RULES, RESIDUAL_RULES, Residual, residual, restored
 
 _OUTSIDE = -1e15          # 1/z outside the image
-_ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH = range(3)  # planes of the surface
-_SHADOW_PLANES = 5        # of `Shadows`
+_ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH, _ROUGH = range(4)  # planes of the surface
+_SHADOW_PLANES = 6        # of `Shadows`
 _AROUND = [*window(1), (0, 0)]
 T = TypeVar("T")
 
@@ -62,9 +62,10 @@ class Passes:
     """The planes and recorded steps of a layout, and the passes that they are.
 
     Attributes:
-        surfaces: planes of object ID, 1/z, and 1/z of what has a history.
+        surfaces: planes of object ID, 1/z, 1/z of what has a history, and `Roughness.share`.
         buffer: planes of what is being smoothed or filtered, see `layout.py`.
-        around: surfaces of the 3x3 pixels around. fill: of unlit pixels' visibility.
+        around: surfaces of the 3x3 pixels around. ring: of shares of roughness.
+        fill: of unlit pixels' visibility.
     """
 
     stencil: Stencil
@@ -72,6 +73,8 @@ class Passes:
     surfaces: Planes
     buffer: Planes
     around: Taps[SurfaceTap]
+    ring: Taps[Float]
+    roughness: Step[..., Roughness]
     loosen: Step[..., TangentPlane]
     fill: Level
     follow_shadows: Step[..., list[Shadows]]
@@ -89,7 +92,7 @@ class Passes:
 
     @staticmethod
     def make(stencil: Stencil, layout: SignalLayout) -> Passes:
-        surfaces = stencil.planes([-1.0, _OUTSIDE, _OUTSIDE])
+        surfaces = stencil.planes([-1.0, _OUTSIDE, _OUTSIDE, 0.0])
         spread = [PlaneRule(SPREAD_LEVEL)] * (_SHADOW_PLANES * (layout.groups or 1))
         buffer = stencil.planes([0.0] * max(len(layout.smoothing_rules), len(spread),
                                             layout.output_planes(layout.output_level(0))))
@@ -116,6 +119,8 @@ class Passes:
         return Passes(
             stencil, layout, surfaces, buffer,
             surfaces.taps(_AROUND, [_INVERSE_DEPTH, _ID]).named(SurfaceTap),
+            surfaces.taps(RING, [_ROUGH]).named(single),
+            Step(roughness),
             Step(loosened),
             Level.make(0, buffer, 2, surfaces, _INVERSE_DEPTH, fill_level),
             Step(lambda chosen, *a: of_each_light(follow_shadows(stencil, *a), chosen,
@@ -139,7 +144,9 @@ class Passes:
     def store_surface(self, id_: Float, plane: TangentPlane) -> TangentPlane:
         """The tangent planes as they count from here on."""
         self.surfaces.store([id_, plane.inverse_depth])
-        return self.loosen(self.around, plane)
+        rough = self.roughness(self.around, plane)
+        self.surfaces.store(rough.share, first=_ROUGH)
+        return self.loosen(self.ring, rough, plane)
 
     def with_visibility_of_unlit(self, signals: list[Signal], lit: Float,
                                  plane: TangentPlane) -> list[Signal]:
@@ -178,7 +185,7 @@ class Passes:
                       sigmas: list[Float], narrower: Float | None) -> list[Signal]:
         """The last filter of each signal; narrower: of `narrowed`."""
         falloff = OutputFalloff(merged.fades, merged.sparse_fades, innovations.footprint_falloffs,
-                                narrower)
+                                innovations.contact_falloff, narrower)
         before = [_counted(noisy) for noisy in merged.signals]
         if merged.parts is not None:
             before = [before[0]._replace(parts=merged.parts)]

@@ -31,9 +31,9 @@ def follow_shadows(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
     blocked, scale = stopped(rays, surface.id)
     light = transform(rays.camera_from_world, rays.ray.light)
     cosine = dr.abs(dot(surface.normal, light)) * scale
-    focal = dr.abs(rays.screen_from_camera.x.x)
+    distance, focal = rays.ray.blocker_distance, dr.abs(rays.screen_from_camera.x.x)
     return Shadows(shadow_motion(stencil, rays, surface, position),
-                   penumbra_samples(stencil, blocked, rays.ray.blocker_distance * scale, cosine,
+                   penumbra_samples(stencil, blocked, distance, distance * scale, cosine,
                                     rays.ray.light_id, surface.depth, focal, rays.light_sizes))
 
 

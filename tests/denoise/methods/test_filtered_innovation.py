@@ -86,8 +86,8 @@ def with_layers(frame):
 
 
 def with_leaves(frame, seed=0):
-    """The frame with leaves smaller than a pixel in the place of a part of its wall, of which a
-    third is not lit."""
+    """The frame with leaves smaller than a pixel, of two objects, in the place of a part of its
+    wall, of which a third is not lit."""
     rng = np.random.default_rng(seed)
     shape = frame["id"].shape
     leaves = ((frame["id"] == 0) & (np.arange(shape[1]) > shape[1] // 3))[..., None]
@@ -98,7 +98,9 @@ def with_leaves(frame, seed=0):
         position - eye, axis=-1, keepdims=True), 1e-9)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     lit = ~leaves | (rng.random((*shape, 1)) < 2 / 3)
+    of_other = leaves[..., 0] & (rng.random(shape) < 0.5)
     return with_images(frame, depth=frame["depth"] * nearer, position=position,
+                       id=np.where(of_other, 1, frame["id"]),
                        unshadowed=frame["unshadowed"] * lit, direct=frame["direct"] * lit,
                        normal=np.where(leaves, normal, frame["normal"]))
 
