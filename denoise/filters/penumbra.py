@@ -18,14 +18,6 @@ Rays to one of several groups of lights are few, and near a contact those that w
 have gone to others. What stands in the way of one light is likely to be in that of another: q of a
 group is at least three tenths of that of all rays. Our own.
 
-What is close by keeps other light off, too, as in the slit under a box, over about as many pixels
-as it is away, d f / z. The last filter weighs taps of diffuse and glossy light by
-
-    exp(-k r^2 c / (2 p^2)),
-
-c being the mean over all rays around of 1 / ((2 d f / z)^2 + 1), 0 for one that was not stopped,
-and k a fifth of diffuse light, which is noisier, and 1 of glossy light. Our own.
-
 Source: Mehta et al. 2012, "Axis-Aligned Filtering for Interactive Sampled Soft Shadows", which
 takes the extremes of d around a pixel, not a mean, and filters by this width alone.
 """
@@ -45,32 +37,27 @@ _OF_ALL = 0.3                  # share of q of all rays that q of a group is at 
 
 
 class PenumbraSample(NamedTuple):
-    """Whether a pixel's shadow ray was stopped, 1 or 0, and q and c where it was; or means of
-    these."""
+    """Whether a pixel's shadow ray was stopped, 1 or 0, and q where it was; or means of these."""
 
     blocked: Float
     inverse_width: Float
-    contact: Float
 
 
-def penumbra_samples(stencil: Stencil, blocked: Bool, distance: Float, share: Float, cosine: Float,
-                     light_id: Float, depth: Float, focal: Float,
-                     sizes: Float) -> PenumbraSample:
+def penumbra_samples(stencil: Stencil, blocked: Bool, share: Float, cosine: Float, light_id: Float,
+                     depth: Float, focal: Float, sizes: Float) -> PenumbraSample:
     """How sharp each pixel's shadow is.
 
     Args:
-        blocked: of `shadow_motion.stopped`. distance: d. share: d / D.
-        cosine: between the ray and the normal. light_id: what the ray was sent to. focal: f.
-        sizes: of `light_sizes`.
+        blocked: of `shadow_motion.stopped`. share: d / D. cosine: between the ray and the normal.
+        light_id: what the ray was sent to. focal: f. sizes: of `light_sizes`.
     """
     from_end = dr.maximum(light_id, SUN) + float(dr.width(sizes))
     size = dr.gather(stencil.Float, sizes, stencil.UInt(
         dr.select(blocked, dr.select(light_id >= 0, light_id, from_end), 0)))
     left = dr.square((1 - share) * cosine)
     q = left / dr.maximum(dr.square(size * share * focal / depth) + left, 1e-20)
-    contact = 1 / dr.fma(4, dr.square(distance * focal / depth), 1)
     return PenumbraSample(dr.select(blocked, stencil.Float(1), 0),
-                          dr.select(blocked & (q > 0), q, 0), dr.select(blocked, contact, 0))
+                          dr.select(blocked & (q > 0), q, 0))
 
 
 def footprint_falloff(around: PenumbraSample, scale: Float, min_share: float) -> Float:
@@ -95,8 +82,3 @@ def footprint_falloffs(around: list[PenumbraSample], scale: Float,
     together = mapped(lambda *of_each: sum(of_each), *around)
     least = _OF_ALL * footprint_falloff(together, scale, min_share)
     return [dr.maximum(falloff, least) for falloff in falloffs]
-
-
-def contact_falloff(around: list[PenumbraSample], scale: Float) -> Float:
-    """log2(e) c / (2 p^2) of each pixel; arguments as of `footprint_falloffs`."""
-    return scale * sum(group.contact for group in around)

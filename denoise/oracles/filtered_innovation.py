@@ -420,14 +420,22 @@ def narrowness(frame: Frame, told: np.ndarray, m) -> np.ndarray:
     return np.where(share > 1e-3, around[..., 1] / np.maximum(share, 1e-3), 0) / (2 * m.penumbra**2)
 
 
-def contact(frame: Frame, m) -> np.ndarray:
-    """c / (2 p^2) from how far what stopped the rays around is from the surface."""
-    told = frame["group"] >= 0 if "group" in frame else True
-    stopped = told & (frame["id"] >= 0) & (frame["blocker_distance"] > 0)
+def contact(frame: Frame, m, name: str, length: np.ndarray) -> np.ndarray:
+    """k / (2 p^2) from how far what shadow rays and paths around met is from the surface."""
     focal = (frame.screen_from_world @ np.linalg.inv(frame.camera_from_world))[0, 0]
-    pixels = frame["blocker_distance"].astype(float) * focal / np.where(stopped, frame["depth"], 1)
-    c = np.where(stopped, 1 / (4 * pixels**2 + 1), 0)
-    return spread_out(frame, c[..., None], m)[..., 0] / (2 * m.penumbra**2)
+
+    def near(channel: str, there: np.ndarray) -> np.ndarray:
+        there = there & (frame[channel] > 0)
+        pixels = frame[channel].astype(float) * focal / np.where(there, frame["depth"], 1)
+        c = np.where(there, 1 / (4 * pixels**2 + 1), 0)
+        return spread_out(frame, c[..., None], m)[..., 0] / (2 * m.penumbra**2)
+
+    seen = frame["id"] >= 0
+    of_shadows = near("blocker_distance", seen)
+    if name == "G":
+        return of_shadows
+    of_paths = near("hit_distance", seen) if "hit_distance" in frame else 0
+    return (of_shadows + 2 * of_paths) * length / (length + 3)
 
 
 def run(frames: list[Frame], m) -> np.ndarray:
@@ -556,7 +564,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict
                 least = min(m.mirror_sigma / sigma, 1)
                 sigmas = sigma * np.clip(roughness_of(frame) / 0.1, least, 1)
             if name in "LG" and "light" in frame and m.follow_shadows and len(signals) > 1:
-                narrow = {"L": 0.2, "G": 1}[name] * contact(frame, m)
+                narrow = contact(frame, m, name, n)
             out[name] = guided(frame, history, s2, levels, sigmas, fade, narrow, m,
                                np.clip(samples, 1e-5, 1) if sparse else None,
                                {"L": 0.2, "G": 1.0}.get(name, 0))

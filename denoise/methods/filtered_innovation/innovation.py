@@ -49,8 +49,8 @@ of h compares luminance too,
 
 sigma being less for glossy light the narrower its lobe is, down to a mirror's at roughness 0,
 and its last level fades out as the history grows. A pixel of another object counts for two fifths.
-Visibility is filtered no farther than shadows are soft, and so are its e and Q, and near a contact
-the last filter of other light is narrower: `penumbra.py`.
+Visibility is filtered no farther than shadows are soft, and so are its e and Q: `penumbra.py`. The
+last filter of other light is narrower where other surfaces are close: `contact.py`.
 Normals are not compared: where they differ much the tangent plane is soon left, and at a crease, or
 on a leaf, a neighbour turned away is a better guess than one sample (+0.2 to 0.9 dB for
 normal_power 0 instead of 4 and 128).
@@ -66,7 +66,8 @@ from typing import NamedTuple
 
 import drjit as dr
 
-from onespp.denoise.filters.penumbra import contact_falloff, footprint_falloffs
+from onespp.denoise.filters.contact import Contact
+from onespp.denoise.filters.penumbra import footprint_falloffs
 from onespp.denoise.history.records import look_up, pack_records, record_words
 from onespp.denoise.history.reflections import Lobes, turned
 from onespp.denoise.history.reprojection import Motion, ReprojectionTests, locate
@@ -81,7 +82,7 @@ from onespp.denoise.jit.vector import dot
 from .layout import LUMINANCE_PLACE, History, SignalLayout, Smoothed
 from .noise import MAX_ENERGY, spatial_variances
 from .output import FEWEST_SAMPLES
-from .shadows import Shadows
+from .shadows import Surroundings
 from .texture import AtRest, FromHistory, choose, found_at_rest, missed
 
 _TIE = 1e-6                    # excess of a history that is no better nor worse
@@ -117,7 +118,7 @@ class Innovations(NamedTuple):
         shadows: of the other history of each visibility that has one. footprint_falloffs: of
             `penumbra.py`, of each of those. sparse: of each sparse signal. turned: t of
             `reflections.py`, None where the lobes of glossy light are not known.
-        contact_falloff: of `penumbra.py`, None where there are no shadow rays.
+        contact: of `contact.contact_falloff`, None where there are no shadow rays.
         misses: what reprojection may miss of texture, see `texture.py`; at_rest: of that module;
             spatial: of `noise.py`, of such light.
     """
@@ -134,12 +135,12 @@ class Innovations(NamedTuple):
     misses: Float | None = None
     at_rest: AtRest | None = None
     spatial: Float | None = None
-    contact_falloff: Float | None = None
+    contact: Contact | None = None
 
 
 def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signal],
                      chosen: Chosen | None, surface: SurfaceSample, plane: TangentPlane,
-                     motion: Motion, records: Float, shadows: list[Shadows],
+                     motion: Motion, records: Float, around: Surroundings,
                      tests: ReprojectionTests, max_history_length: Float,
                      falloff_scale: Float, lobes: Lobes | None,
                      rest: Motion | None) -> Innovations:
@@ -147,7 +148,7 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
 
     Args:
         motion: of `motion_between`. records: of `pack_history`.
-        shadows: of `follow_shadows`, smoothed. falloff_scale: of `penumbra.footprint_falloff`.
+        around: of `look_around`, smoothed. falloff_scale: of `penumbra.footprint_falloff`.
         lobes: of `reflections.lobes_between`. rest: of `texture.at_rest_between`.
     """
     place = locate(stencil, surface, motion, tests.plane_tolerance)
@@ -183,7 +184,7 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
         found = FromHistory(e[0], variances[0], lengths[0], misses)
         at_rest = found_at_rest(layout, signals[0], other, found, max_history_length, moves,
                                 1 - dot(place.normal, there.normal))
-    others = []
+    others, shadows = [], around.shadows
     for f, shadow in enumerate(shadows):
         s = len(signals) - len(shadows) + f
         visibility, variance, moves = look_up_shadow(
@@ -201,7 +202,7 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
                        footprint_falloffs(penumbras, falloff_scale, MIN_SHARE), sparse,
                        None if lobes is None else turned(lobes, surface.normal, place), misses,
                        at_rest, spatial,
-                       contact_falloff(penumbras, falloff_scale) if penumbras else None)
+                       mapped(lambda near: falloff_scale * near, around.contact))
 
 
 def choose_histories(layout: SignalLayout, innovations: Innovations,

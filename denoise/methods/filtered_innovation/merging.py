@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import drjit as dr
 
+from onespp.denoise.filters.contact import ContactFalloff, contact_falloff
 from onespp.denoise.inputs.signals import LARGEST_VISIBILITY, Chosen, Signal, SignalKind
 from onespp.denoise.inputs.surface import TangentPlane
 from onespp.denoise.jit.arrays import Float
@@ -52,13 +53,14 @@ class Gains(NamedTuple):
 
 class Merged(NamedTuple):
     """The new history of each signal, its lengths, and `fade_out` of each signal, of sparse ones by
-    their samples; of light with texture, what it was made of."""
+    their samples; of light with texture, what it was made of; and what `contact.py` asks for."""
 
     signals: list[NoisySignal]
     lengths: list[Float]
     fades: list[Float]
     sparse_fades: list[Float]
     parts: Pair | None = None
+    contact: ContactFalloff | None = None
 
 
 def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovations: Innovations,
@@ -147,7 +149,8 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
         merged.append(NoisySignal(merged_signal, variance, samples))
     fades = [fade_out(lengths[layout.length(s)], gains.fade_frames) for s in dense]
     parts = parts_of(signals[0], innovations.signals[0]) if layout.has_texture else None
-    return Merged(merged, lengths, fades, sparse_fades, parts)
+    contact = innovations.contact and contact_falloff(innovations.contact, lengths[0])
+    return Merged(merged, lengths, fades, sparse_fades, parts, contact)
 
 
 def _only_sample(signal: Signal, omega: Float) -> Float:

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
 import drjit as dr
+import numpy as np
 
 from onespp.denoise.filters.atrous import BACKGROUND, LARGEST_LEVELS
 from onespp.denoise.geometry.cameras import pixel_angle
@@ -177,7 +178,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     penumbra: float = 0.6
     follow_shadows: bool = True
 
-    uses: ClassVar[tuple[str, ...]] = (*USED, *SHADOW)
+    uses: ClassVar[tuple[str, ...]] = (*USED, *SHADOW, "hit_distance")
     renamed: ClassVar[Mapping[str, str]] = INNOVATION_RENAMED
 
     def __post_init__(self) -> None:
@@ -250,15 +251,17 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             lobes = lobes_between(previous, frame, given.lobe, surface.position, stencil)
             narrower = narrowed(given.roughness,
                                 stencil.opaque(min(self.mirror_sigma / self.light_sigma, 1)))
-        evaluate(signals, given.lit, sample, plane, id_, (rays, surface.position) if rays else None,
-                 chosen, lobes, narrower)
+        (hit_distance,) = stencil.load(np.asarray(
+            frame["hit_distance"] if "hit_distance" in frame else np.zeros_like(frame["depth"])))
+        evaluate(signals, given.lit, sample, plane, id_,
+                 (rays, hit_distance, surface.position) if rays else None, chosen, lobes, narrower)
 
         plane = passes.store_surface(id_, plane)
         if given.lit is not None:
             signals = passes.with_visibility_of_unlit(signals, given.lit, plane)
-        shadows = passes.spread_shadows(rays, sample, surface.position, plane, chosen)
+        around = passes.surroundings(rays, hit_distance, sample, surface.position, plane, chosen)
         innovations = passes.find_innovations(
-            signals, chosen, sample, plane, motion, records, shadows,
+            signals, chosen, sample, plane, motion, records, around,
             *self._reprojection_parameters(stencil), lobes,
             at_rest_between(previous, frame, stencil) if layout.has_texture else None)
         innovations = passes.choose_histories(innovations, plane)

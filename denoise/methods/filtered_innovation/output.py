@@ -9,6 +9,7 @@ from typing import NamedTuple
 import drjit as dr
 
 from onespp.denoise.filters.atrous import EPSILON
+from onespp.denoise.filters.contact import ContactFalloff
 from onespp.denoise.filters.tangent_plane import BINOMIAL, SurfaceTap, surface_exponent
 from onespp.denoise.inputs.signals import SignalKind
 from onespp.denoise.inputs.surface import TangentPlane
@@ -24,20 +25,19 @@ FEWEST_SAMPLES = 1e-5          # that a sparse signal's pixel counts for where i
 WIDE_LOBE = 0.1                # roughness: such a lobe blurs an image as far as the filter does
 NEIGHBOURS_NOISE = {           # share of a noisier neighbour's variance beyond the pixel's own
     SignalKind.DIFFUSE: 0.2, SignalKind.GLOSSY: 1.0, SignalKind.VISIBILITY: 0.0}
-CONTACT = {SignalKind.DIFFUSE: 0.2, SignalKind.GLOSSY: 1.0}  # k of `penumbra.py`
 _NEVER = -1e3                  # log2 of a weight that is 0
 
 
 class OutputFalloff(NamedTuple):
     """What weakens the taps of the last filter: `fade_out` of its last level, of each signal that
     is not sparse and of each that is, `penumbra.footprint_falloff` of each visibility that shadow
-    rays tell of, `penumbra.contact_falloff` where there are such rays, and by what sigma of glossy
+    rays tell of, `contact_falloff` where there are such rays, and by what sigma of glossy
     light is divided, of `narrowed`."""
 
     fades: list[Float]
     sparse_fades: list[Float]
     footprints: list[Float]
-    contact: Float | None
+    contact: ContactFalloff | None
     narrowed: Float | None
 
 
@@ -116,8 +116,9 @@ class _Rule(NamedTuple):
         f, g = layout.follower(s), layout.group(s)
         fade = falloff.fades[s] if g is None else falloff.sparse_fades[g]
         near = None if f is None else falloff.footprints[f]
-        if falloff.contact is not None and layout.kinds[s] in CONTACT:
-            near = CONTACT[layout.kinds[s]] * falloff.contact
+        if falloff.contact is not None and near is None:
+            is_glossy = layout.kinds[s] is SignalKind.GLOSSY
+            near = falloff.contact.glossy if is_glossy else falloff.contact.diffuse
         return _Rule(footprint(near, spacing),
                      fade if layout.is_last_level(s, level) else None,
                      NEIGHBOURS_NOISE[layout.kinds[s]])

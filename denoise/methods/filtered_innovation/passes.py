@@ -23,13 +23,13 @@ from .innovation import Innovations, choose_histories, find_innovations, pack_hi
 from .layout import NoisySignal, PlaneRule, SignalLayout, Smoothed
 from .merging import Merged, merge
 from .output import FEWEST_SAMPLES, OutputFalloff, output_level
-from .shadows import Shadows, follow_shadows, of_each_light
+from .shadows import Surroundings, look_around
 from .smoothing import fill_level, smooth_level
 from .texture import CHOICE_RULES, RESIDUAL_RULES, Residual, residual, restored
 
 _OUTSIDE = -1e15          # 1/z outside the image
 _ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH, _ROUGH = range(4)  # planes of the surface
-_SHADOW_PLANES = 6        # of `Shadows`
+_SHADOW_PLANES, _CONTACT_PLANES = 5, 2  # of `Shadows` and `Contact`
 _AROUND = [*window(1), (0, 0)]
 T = TypeVar("T")
 
@@ -77,7 +77,7 @@ class Passes:
     roughness: Step[..., Roughness]
     loosen: Step[..., TangentPlane]
     fill: Level
-    follow_shadows: Step[..., list[Shadows]]
+    look_around: Step[..., Surroundings]
     spread: Level
     find_innovations: Step[..., Innovations]
     choice: list[Level]
@@ -93,7 +93,8 @@ class Passes:
     @staticmethod
     def make(stencil: Stencil, layout: SignalLayout) -> Passes:
         surfaces = stencil.planes([-1.0, _OUTSIDE, _OUTSIDE, 0.0])
-        spread = [PlaneRule(SPREAD_LEVEL)] * (_SHADOW_PLANES * (layout.groups or 1))
+        spread = [PlaneRule(SPREAD_LEVEL)] * (_SHADOW_PLANES * (layout.groups or 1)
+                                              + _CONTACT_PLANES)
         buffer = stencil.planes([0.0] * max(len(layout.smoothing_rules), len(spread),
                                             layout.output_planes(layout.output_level(0))))
 
@@ -123,8 +124,8 @@ class Passes:
             Step(roughness),
             Step(loosened),
             Level.make(0, buffer, 2, surfaces, _INVERSE_DEPTH, fill_level),
-            Step(lambda chosen, *a: of_each_light(follow_shadows(stencil, *a), chosen,
-                                                  layout.groups)),
+            Step(lambda rays, hit_distance, chosen, *a: look_around(
+                stencil, rays, hit_distance, chosen, layout.groups, *a)),
             Level.make(SPREAD_LEVEL, buffer, len(spread), surfaces, _INVERSE_DEPTH,
                        lambda *a: smooth_level(spread, *a)),
             Step(lambda *a: find_innovations(stencil, layout, *a)),
@@ -157,13 +158,14 @@ class Passes:
         filled, _ = self._through([self.fill], [visibility.luminance, lit], plane)
         return [*others, visibility._replace(luminance=filled)]
 
-    def spread_shadows(self, rays: ShadowRays | None, surface: SurfaceSample, position: Vector3,
-                       plane: TangentPlane, chosen: Chosen | None) -> list[Shadows]:
-        """`follow_shadows` of each light, and means of it over a few pixels around."""
+    def surroundings(self, rays: ShadowRays | None, hit_distance: Float, surface: SurfaceSample,
+                     position: Vector3, plane: TangentPlane,
+                     chosen: Chosen | None) -> Surroundings:
+        """`look_around`, and means of it over a few pixels around."""
         if rays is None:
-            return []
-        return self._through([self.spread], self.follow_shadows(chosen, rays, surface, position),
-                             plane)
+            return Surroundings([], None)
+        return self._through([self.spread], self.look_around(rays, hit_distance, chosen, surface,
+                                                             position), plane)
 
     def choose_histories(self, innovations: Innovations, plane: TangentPlane) -> Innovations:
         """With the better one of the two histories of each sparse signal, or of light with texture;
@@ -185,7 +187,7 @@ class Passes:
                       sigmas: list[Float], narrower: Float | None) -> list[Signal]:
         """The last filter of each signal; narrower: of `narrowed`."""
         falloff = OutputFalloff(merged.fades, merged.sparse_fades, innovations.footprint_falloffs,
-                                innovations.contact_falloff, narrower)
+                                merged.contact, narrower)
         before = [_counted(noisy) for noisy in merged.signals]
         if merged.parts is not None:
             before = [before[0]._replace(parts=merged.parts)]

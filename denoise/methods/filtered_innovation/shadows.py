@@ -7,12 +7,13 @@ from typing import NamedTuple
 
 import drjit as dr
 
+from onespp.denoise.filters.contact import Contact, contact_samples
 from onespp.denoise.filters.penumbra import PenumbraSample, penumbra_samples
 from onespp.denoise.history.shadow_motion import ShadowMotion, shadow_motion
 from onespp.denoise.inputs.shadow_rays import ShadowRays, stopped
 from onespp.denoise.inputs.signals import Chosen
 from onespp.denoise.inputs.surface import SurfaceSample
-from onespp.denoise.jit.arrays import Vector3
+from onespp.denoise.jit.arrays import Float, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import mapped
 from onespp.denoise.jit.vector import dot, transform
@@ -25,16 +26,39 @@ class Shadows(NamedTuple):
     penumbra: PenumbraSample
 
 
+class Surroundings(NamedTuple):
+    """What the rays of each pixel met, of each light, or means over the pixels around."""
+
+    shadows: list[Shadows]
+    contact: Contact | None
+
+
 def follow_shadows(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
                    position: Vector3) -> Shadows:
     """`shadow_motion` and `penumbra_samples` of each pixel; arguments as of the former."""
     blocked, scale = stopped(rays, surface.id)
     light = transform(rays.camera_from_world, rays.ray.light)
     cosine = dr.abs(dot(surface.normal, light)) * scale
-    distance, focal = rays.ray.blocker_distance, dr.abs(rays.screen_from_camera.x.x)
     return Shadows(shadow_motion(stencil, rays, surface, position),
-                   penumbra_samples(stencil, blocked, distance, distance * scale, cosine,
-                                    rays.ray.light_id, surface.depth, focal, rays.light_sizes))
+                   penumbra_samples(stencil, blocked, rays.ray.blocker_distance * scale, cosine,
+                                    rays.ray.light_id, surface.depth, focal_length(rays),
+                                    rays.light_sizes))
+
+
+def focal_length(rays: ShadowRays) -> Float:
+    """Pixels of a unit length at depth 1."""
+    return dr.abs(rays.screen_from_camera.x.x)
+
+
+def look_around(stencil: Stencil, rays: ShadowRays, hit_distance: Float, chosen: Chosen | None,
+                groups: int, surface: SurfaceSample, position: Vector3) -> Surroundings:
+    """What each pixel knows; arguments as of `of_each_light`, `shadow_motion`, `contact_samples`.
+    """
+    blocked, _ = stopped(rays, surface.id)
+    return Surroundings(
+        of_each_light(follow_shadows(stencil, rays, surface, position), chosen, groups),
+        contact_samples(blocked, rays.ray.blocker_distance, hit_distance,
+                        focal_length(rays) / surface.depth))
 
 
 def of_each_light(shadows: Shadows, chosen: Chosen | None, groups: int) -> list[Shadows]:

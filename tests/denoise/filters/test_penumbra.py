@@ -8,12 +8,7 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from onespp.denoise.filters.penumbra import (
-    PenumbraSample,
-    contact_falloff,
-    footprint_falloff,
-    footprint_falloffs,
-)
+from onespp.denoise.filters.penumbra import PenumbraSample, footprint_falloff, footprint_falloffs
 from onespp.denoise.inputs.shadow_rays import light_sizes, read_shadow_rays
 from onespp.denoise.inputs.surface import read_surface
 from onespp.denoise.jit.grid import Stencil
@@ -47,7 +42,7 @@ def sharpness_of(frame):
     """(h, w) whether the ray was stopped, and q."""
     stencil = Stencil(frame.height, frame.width, 1)
     surface, rays = read_surface(frame, stencil), read_shadow_rays(frame, frame, stencil)
-    _, (blocked, q, _) = follow_shadows(stencil, rays, surface.sample, surface.position)
+    _, (blocked, q) = follow_shadows(stencil, rays, surface.sample, surface.position)
     return stencil.image([blocked]) > 0, stencil.image([q])
 
 
@@ -91,21 +86,20 @@ def test_a_hard_shadow_is_as_narrow_as_a_pixel():
 def test_where_nothing_was_stopped_a_filter_is_as_wide_as_ever():
     stencil = Stencil(1, 4, 1)
     share, q = stencil.Float([0, 5e-4, 0.5, 1]), stencil.Float([0, 1e-4, 0.2, 1])
-    falloff = footprint_falloff(PenumbraSample(share, q, q), dr.opaque(stencil.Float, 2.0), 1e-3)
+    falloff = footprint_falloff(PenumbraSample(share, q), dr.opaque(stencil.Float, 2.0), 1e-3)
     np.testing.assert_allclose(falloff.numpy(), [0, 0, 0.8, 2], rtol=1e-6)
 
 
 def test_what_stands_in_the_way_of_one_group_of_lights_is_somewhat_in_that_of_another():
     stencil = Stencil(1, 3, 1)
+    groups = [PenumbraSample(stencil.Float([0, 0.25, 0]), stencil.Float([0, 0.05, 0])),
+              PenumbraSample(stencil.Float([0.5, 0.25, 0]), stencil.Float([0.4, 0.25, 0]))]
     scale = dr.opaque(stencil.Float, 2.0)
-    groups = [PenumbraSample(stencil.Float([0, 0.25, 0]), stencil.Float([0, 0.05, 0]), scale),
-              PenumbraSample(stencil.Float([0.5, 0.25, 0]), stencil.Float([0.4, 0.25, 0]), scale)]
     first, second = (f.numpy() for f in footprint_falloffs(groups, scale, 1e-3))
     np.testing.assert_allclose(first, [0.3 * 1.6, 0.4, 0], rtol=1e-6)
     np.testing.assert_allclose(second, [1.6, 2, 0], rtol=1e-6)
     (alone,) = footprint_falloffs(groups[1:], scale, 1e-3)
     np.testing.assert_allclose(alone.numpy(), second, rtol=1e-6)
-    np.testing.assert_allclose(contact_falloff(groups, scale).numpy(), 8, rtol=1e-6)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e38, 0.0])

@@ -29,7 +29,7 @@ def run(method, frames):
 
 def with_shadow_rays(frame, seed=0, light=(1.0, -3.0, 1.0)):
     """The frame with shadow rays to two lights of a size, of which the board (object 1) stops two
-    in five."""
+    in five, and paths of which half meet something close."""
     rng = np.random.default_rng(seed)
     there = frame["id"] >= 0
     lights = rng.choice([-1, 0], there.shape)
@@ -39,7 +39,9 @@ def with_shadow_rays(frame, seed=0, light=(1.0, -3.0, 1.0)):
     distance = np.linalg.norm(toward, axis=-1) * rng.uniform(0.3, 0.6, there.shape)
     return with_images(frame, light=toward, light_id=lights,
                        blocker_distance=np.where(stopped, distance, 0),
-                       blocker_id=np.where(stopped, 1, -1))
+                       blocker_id=np.where(stopped, 1, -1),
+                       hit_distance=np.where(there, np.maximum(rng.uniform(-0.2, 0.2, there.shape),
+                                                               0), 0))
 
 
 def with_neighbour(frame):
@@ -364,7 +366,7 @@ def test_five_frames_are_one_recording_and_parameters_compile_nothing(layers):
     assert compiled(lambda: run(other, frames)) == 0
     _, state = run(FilteredInnovation(), frames)
     passes = state.passes
-    steps = [passes.follow_shadows, passes.find_innovations, passes.merge, passes.pack,
+    steps = [passes.look_around, passes.find_innovations, passes.merge, passes.pack,
              *(level.step for level in (passes.spread, *passes.smoothing, *passes.output))]
     assert (state.layered is not None) == layers
     if layers:

@@ -1,0 +1,25 @@
+"""How close other surfaces are: against geometry, and against numbers that are none."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from onespp.denoise.filters.contact import Contact, contact_falloff, contact_samples
+from onespp.denoise.jit.grid import Stencil
+
+
+def test_what_met_something_tells_how_many_pixels_away_it_is():
+    stencil = Stencil(1, 4, 1)
+    met = contact_samples(stencil.Float([1, 1, 0, 1]) > 0,
+                          stencil.Float([0.0, 0.05, 0.05, 1e38]),
+                          stencil.Float([0.5, 0.0, np.nan, np.inf]), stencil.Float(10.0))
+    np.testing.assert_allclose(met.of_shadows.numpy(), [1, 0.5, 0, 0], rtol=1e-6)
+    np.testing.assert_allclose(met.of_paths.numpy(), [1 / 101, 0, 0, 0], rtol=1e-6)
+
+
+def test_diffuse_light_narrows_with_the_length_of_its_history():
+    stencil = Stencil(1, 3, 1)
+    falloff = contact_falloff(Contact(stencil.Float([0.0, 0.5, 1]), stencil.Float([0, 0, 0.5])),
+                              stencil.Float([1, 1, 9]))
+    np.testing.assert_allclose(falloff.glossy.numpy(), [0, 0.5, 1], rtol=1e-6)
+    np.testing.assert_allclose(falloff.diffuse.numpy(), [0, 0.5 / 4, 2 * 9 / 12], rtol=1e-6)
