@@ -59,7 +59,7 @@ def test_half_precision_saves_half_of_the_bytes(folders):
 
 def test_training_has_what_methods_read_and_nothing_that_follows():
     read = {c for name in METHODS for c in channels_read(build(name), OFFERED)}
-    read -= {*REPLAY, "hit_distance", "hit_id"}  # which `asvgf` and `trmv` alone read
+    read -= {*REPLAY, "hit_id"}  # which `asvgf` and `trmv` alone read
     assert {c for c in available(TRAINING) if c != "position"} == read
     assert not set(TRAINING) & set(DERIVED)
 

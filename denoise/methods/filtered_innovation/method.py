@@ -252,7 +252,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             narrower = narrowed(given.roughness,
                                 stencil.opaque(min(self.mirror_sigma / self.light_sigma, 1)))
         (hit_distance,) = stencil.load(np.asarray(
-            frame["hit_distance"] if "hit_distance" in frame else np.zeros_like(frame["depth"])))
+            frame["hit_distance"] if "hit_distance" in frame else 0 * frame["depth"], np.float32))
         evaluate(signals, given.lit, sample, plane, id_,
                  (rays, hit_distance, surface.position) if rays else None, chosen, lobes, narrower)
 

@@ -144,7 +144,7 @@ def test_frames_are_one_recording():
     passes = state.passes
     assert passes is not None
     assert passes.choice
-    steps = [passes.follow_shadows, passes.find_innovations, passes.choose, passes.merge,
+    steps = [passes.look_around, passes.find_innovations, passes.choose, passes.merge,
              passes.pack,
              *(level.step for level in (passes.spread, *passes.choice, *passes.smoothing,
                                      *passes.output))]
