@@ -251,8 +251,9 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             lobes = lobes_between(previous, frame, given.lobe, surface.position, stencil)
             narrower = narrowed(given.roughness,
                                 stencil.opaque(min(self.mirror_sigma / self.light_sigma, 1)))
-        (hit_distance,) = stencil.load(np.asarray(
-            frame["hit_distance"] if "hit_distance" in frame else 0 * frame["depth"], np.float32))
+        hit_distance = stencil.opaque(0)  # where a frame does not say
+        if rays is not None and "hit_distance" in frame:
+            (hit_distance,) = stencil.load(np.asarray(frame["hit_distance"], np.float32))
         evaluate(signals, given.lit, sample, plane, id_,
                  (rays, hit_distance, surface.position) if rays else None, chosen, lobes, narrower)
 

@@ -127,8 +127,12 @@ def _k_means(points: np.ndarray, weight: np.ndarray, count: int) -> np.ndarray:
         nearest = np.minimum(nearest, np.square(points - centre).sum(1))
     centres = np.array(centres)
     for _ in range(_ROUNDS):
-        cluster = np.argmin(np.square(centres).sum(1) - 2 * points @ centres.T, axis=1)
-        share = weight * (cluster == np.arange(len(centres))[:, None])
+        share = weight * (_nearest(points, centres) == np.arange(len(centres))[:, None])
         mass = share.sum(1, keepdims=True)
         centres = np.where(mass > 0, share @ points / np.maximum(mass, 1e-300), centres)
+    return _nearest(points, centres)
+
+
+def _nearest(points: np.ndarray, centres: np.ndarray) -> np.ndarray:
+    """(n,) int, the centre of each of (n, d) points."""
     return np.argmin(np.square(centres).sum(1) - 2 * points @ centres.T, axis=1)
