@@ -110,7 +110,10 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         bsdf = si.bsdf(ray)
 
         # Light that the last direction ran into (for depth 0: what the camera sees itself).
-        found = beta * _found_light(scene, si, previous_p, bsdf_pdf, from_delta)
+        surer = 1.0
+        if dr.hint(lights is not None, mode="scalar"):
+            surer = dr.select((depth == 1) & si.is_valid(), lights.emitters, 1)
+        found = beta * _found_light(scene, si, previous_p, bsdf_pdf, from_delta, surer)
 
         # Light that this vertex looks for: one shadow ray.
         inner = si.is_valid() & (depth + 1 < longest)
@@ -233,13 +236,18 @@ def _roulette(beta: mi.Color3f, eta: mi.Float, depth: mi.UInt32,
 
 
 def _found_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, previous_p: mi.Point3f,
-                 bsdf_pdf: mi.Float, from_delta: mi.Bool) -> mi.Color3f:
-    """Radiance of what a direction from `previous_p` met, weighed against light sampling."""
+                 bsdf_pdf: mi.Float, from_delta: mi.Bool,
+                 surer: mi.Float | float = 1.0) -> mi.Color3f:
+    """Radiance of what a direction from `previous_p` met, weighed against light sampling.
+
+    Args:
+        surer: how many times the density of light sampling counts, as of `strata.py`.
+    """
     reference = dr.zeros(mi.Interaction3f)
     reference.p = previous_p
     hit = mi.DirectionSample3f(scene, si, reference)
     emitter_pdf = scene.pdf_emitter_direction(reference, hit, ~from_delta)
-    return power_heuristic(bsdf_pdf, emitter_pdf) * hit.emitter.eval(si)
+    return power_heuristic(bsdf_pdf, surer * emitter_pdf) * hit.emitter.eval(si)
 
 
 def _with_split(radiance: Radiance, arrived: mi.Color3f, split: DirectLight | None) -> Radiance:

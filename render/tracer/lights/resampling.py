@@ -15,9 +15,9 @@ add up to an unbiased estimate of direct light. U has no noise, and V = l(D) / l
 share of it that arrives: a filter of V alone leaves texture, shading and highlights of direct light
 as they are. What purely specular lobes reflect is in neither.
 
-The weights are those of plain light sampling: any weights do that add up to 1, and these tame
-lights that touch the surface. The uniform part DELTA reaches lights whose midpoints all lie below
-the horizon.
+Any weights do that add up to 1; those of `strata.py` tame lights that touch the surface, and leave
+as little as they can to what the BSDF's sample runs into, which U does not tell. The uniform part
+DELTA reaches lights whose midpoints all lie below the horizon.
 
 Where several lights meet, V is noise of which of them was picked. So lights are in groups g
 (`scene_lights.py`) with a visibility each. There w_k c_k is in the place of c_k where strata are
@@ -58,15 +58,22 @@ class Lights:
     """All strata of a scene's lights, in the order of `scene.emitters()`, the sun's last.
 
     stratum: which part of which light it is (`stratum_word`). group: that it is in. sizes: strata
-    in each group, none where all lights are one. sun: None where there is none. clusters: of each
-    stratum, None where no light speaks for others.
+    in each group, none where all lights are one. emitters: E, 1 or more. environment: index of that
+    emitter, E where there is none. sun: None where there is none. clusters: of each stratum, None
+    where no light speaks for others.
     """
 
     stratum: mi.UInt32
     group: mi.UInt32
     sizes: tuple[int, ...]
+    emitters: int
+    environment: mi.UInt32
     sun: Sun | None = None
     clusters: Clusters | None = None
+
+    def share(self, stratum: mi.UInt32) -> mi.Float:
+        """By how much the density of a stratum's light counts in weights: see `strata.py`."""
+        return dr.select(stratum >> 8 == self.environment, 1 / self.emitters, 1)
 
 
 @dataclass
@@ -120,7 +127,7 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     Args:
         lights: `Lights`, of the scene.
     """
-    emitters, strata = len(scene.emitters()), dr.width(lights.stratum)
+    strata = dr.width(lights.stratum)
     choice, jitter = sampler.next_1d(), sampler.next_2d()
 
     # One pass: the sum, and a pick in proportion to luminance (a reservoir of one).
@@ -137,7 +144,7 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
             c *= dr.gather(mi.Float, lights.clusters.scale, k, active)
         unshadowed += c
         if dr.hint(len(lights.sizes) > 0, mode="scalar"):
-            c = middle.weight(emitters) * c
+            c = middle.weight(lights.share(stratum)) * c
             group = dr.gather(mi.UInt32, lights.group, k, active)
             by_group = added(by_group, group, c)
         luminance = mi.luminance(c)
@@ -155,7 +162,7 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     middle = light_point(scene, si, stratum, mi.Point2f(0.5), active & uniform, lights.sun)
     of_middle = mi.Color3f(middle.c)
     if dr.hint(len(lights.sizes) > 0, mode="scalar"):
-        of_middle = middle.weight(emitters) * of_middle
+        of_middle = middle.weight(lights.share(stratum)) * of_middle
     if dr.hint(lights.clusters is not None, mode="scalar"):
         of_middle *= dr.gather(mi.Float, lights.clusters.scale, picked, active)
     picked_luminance = dr.select(uniform, mi.luminance(of_middle), picked_luminance)
@@ -171,7 +178,7 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     toward = si.spawn_ray_to(light.p)
     blocker = scene.ray_intersect_preliminary(toward, coherent=False, active=lit)
     shadowed = blocker.is_valid()
-    direct = dr.select(lit & ~shadowed, point.weight(emitters) * c / p, 0)
+    direct = dr.select(lit & ~shadowed, point.weight(lights.share(stratum)) * c / p, 0)
     sample, to_sun = None, mi.Bool(False)
     if dr.hint(lights.sun is not None, mode="scalar"):
         to_sun = lit & ((stratum & SUN_BIT) != 0)

@@ -62,13 +62,17 @@ def find_lights(stage: MitsubaScene) -> Lights:
         endless = np.array([e.is_environment() for e in emitters] + [True] * (sun is not None))
         clusters = clustered(shares, endless, MOST_CLUSTERS)
         luminances = np.stack([luminances[e].sum(0) for e, _ in clusters])
-    return _in_strata(lights, clusters, luminances, delta, sun)
+    stratum, group, sizes, speaking = _in_strata(lights, clusters, luminances, delta)
+    environment = next((i for i, e in enumerate(emitters) if e.is_environment()), len(emitters))
+    return Lights(stratum, group, sizes, max(1, len(emitters)), dr.opaque(mi.UInt32, environment),
+                  sun, speaking)
 
 
 def _in_strata(lights: np.ndarray, clusters: list[tuple[np.ndarray, float]],
-               luminances: np.ndarray, delta: np.ndarray, sun: Sun | None) -> Lights:
-    """Lights from words without cells, of `clustered`, with (clusters, points) luminances, if these
-    are known; delta: of lights."""
+               luminances: np.ndarray, delta: np.ndarray,
+               ) -> tuple[mi.UInt32, mi.UInt32, tuple[int, ...], Clusters | None]:
+    """`stratum`, `group`, `sizes` and `clusters` of `Lights`, from words without cells, of
+    `clustered`, with (clusters, points) luminances, if these are known; delta: of lights."""
     count = len(clusters)
     whole = np.array([len(e) > 1 or delta[e[0]] for e, _ in clusters])
     halvings = np.where(whole, 0, 2) if count <= FEW else cut(luminances, whole)
@@ -82,8 +86,8 @@ def _in_strata(lights: np.ndarray, clusters: list[tuple[np.ndarray, float]],
     if count < len(lights):
         speaking = Clusters.of([word for of_cluster in words for word in of_cluster],
                                np.repeat([s for _, s in clusters], 4**halvings))
-    return Lights(aligned(mi.UInt32, np.array(first, np.uint32)), aligned(mi.UInt32, group.astype(
-        np.uint32)), tuple(map(int, sizes)), sun, speaking)
+    return (aligned(mi.UInt32, np.array(first, np.uint32)),
+            aligned(mi.UInt32, group.astype(np.uint32)), tuple(map(int, sizes)), speaking)
 
 
 def cut(luminances: np.ndarray, delta: np.ndarray) -> np.ndarray:

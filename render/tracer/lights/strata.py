@@ -1,7 +1,11 @@
 """A point of a light, in a stratum: what it gives where nothing is in its way, and its weight.
 
-A stratum is a cell of an emitter's sample square, or all of it. The weights are those of plain
-light sampling against the BSDF's (Veach 1997, section 9.2.2).
+A stratum is a cell of an emitter's sample square, or all of it. The weights are of multiple
+importance sampling (Veach 1997, section 9.2.2). Picks are by what lights give, so that a lamp close
+by is picked nearly for sure: its density counts as if it was, not as one of E lights. So nearly all
+that comes from lamps is in U; what the BSDF's sample runs into, U does not tell. The environment's
+counts as one of E: its strata are wide, those that the horizon cuts are seldom picked, and light
+with a weight of 1 would be fireflies there.
 """
 
 from __future__ import annotations
@@ -24,10 +28,10 @@ class LightPoint:
     light: mi.DirectionSample3f
     bsdf_pdf: mi.Float
 
-    def weight(self, emitters: int) -> mi.Float:
-        """Of multiple importance sampling, as plain light sampling has it."""
+    def weight(self, share: mi.Float) -> mi.Float:
+        """Of multiple importance sampling; share: of the light's density that counts."""
         light = self.light
-        return dr.select(light.delta, 1, power_heuristic(light.pdf / emitters, self.bsdf_pdf))
+        return dr.select(light.delta, 1, power_heuristic(share * light.pdf, self.bsdf_pdf))
 
 
 def stratum_word(light: Any, halvings: Any, cell: Any) -> Any:
