@@ -6,11 +6,13 @@ ray that was stopped tells d, and so does the first segment of a path, if it met
 the mean over the rays around of 1 / ((2 x)^2 + 1), 0 for one that met nothing, a level of the last
 filter of `innovation.py` weighs a tap, r pixels away, also by
 
-    exp(-k r^2 / (2 p^2)),   glossy light   k = c_s
-                             diffuse light  k = (c_s + 2 c_h) n / (n + 3)
+    exp(-k r^2 / (2 p^2)),   diffuse light   k = (c_s + 2 c_h) n / (n + 3)
+                             glossy light    k = c_l n / (n + 3)
 
 of shadow rays and of paths, p as of `penumbra.py`, n the length of the history: the longer it is,
-the less noise is there that would want a wider filter.
+the less noise is there that would want a wider filter. c_l is as c_h is with alpha x for x, alpha
+being the roughness: a lobe shows what is d away blurred over as many pixels, and sharp what is
+close, as the dark slit between a thing and the glossy floor on which it stands.
 
 Source: the idea is that of Mehta et al. 2013, "Axis-aligned filtering for interactive
 physically-based diffuse indirect lighting", where a filter is as wide as the nearest surface is
@@ -30,31 +32,37 @@ HALF_LENGTH = 3.0              # frames
 
 
 class Contact(NamedTuple):
-    """1 / ((2 x)^2 + 1) of each pixel's shadow ray and path; or means of these, c_s and c_h."""
+    """1 / ((2 x)^2 + 1) of each pixel's shadow ray and path, and 1 / ((2 alpha x)^2 + 1) of glossy
+    lobes, if there are any; or means of these, c_s, c_h and c_l."""
 
     of_shadows: Float
     of_paths: Float
+    of_lobes: Float | None = None
 
 
 class ContactFalloff(NamedTuple):
-    """log2(e) k / (2 p^2): what a tap's squared distance takes off the log2 of its weight."""
+    """log2(e) k / (2 p^2): what a tap's squared distance takes off the log2 of its weight; of
+    glossy light None without lobes."""
 
     diffuse: Float
-    glossy: Float
+    glossy: Float | None
 
 
 def contact_samples(blocked: Bool, blocker_distance: Float, hit_distance: Float,
-                    pixels: Float) -> Contact:
+                    pixels: Float, roughness: Float | None = None) -> Contact:
     """Of each pixel.
 
     Args:
         blocked: of `shadow_motion.stopped`. blocker_distance, hit_distance: d; the latter is 0
-            where a path met nothing. pixels: f / z.
+            where a path met nothing. pixels: f / z. roughness: alpha, 1 where there is no lobe.
     """
     def near(there: Bool, distance: Float) -> Float:
         return dr.select(there, 1 / dr.fma(4, dr.square(distance * pixels), 1), 0)
 
-    return Contact(near(blocked, blocker_distance), near(hit_distance > 0, hit_distance))
+    met, of_lobes = hit_distance > 0, None
+    if roughness is not None:
+        of_lobes = near(met & (roughness < 1), roughness * hit_distance)
+    return Contact(near(blocked, blocker_distance), near(met, hit_distance), of_lobes)
 
 
 def contact_falloff(around: Contact, length: Float) -> ContactFalloff:
@@ -63,5 +71,7 @@ def contact_falloff(around: Contact, length: Float) -> ContactFalloff:
     Args:
         around: `contact_samples`, smoothed, times log2(e) / (2 p^2). length: n.
     """
+    trust = length / (length + HALF_LENGTH)
     diffuse = dr.fma(OF_PATHS, around.of_paths, around.of_shadows)
-    return ContactFalloff(diffuse * length / (length + HALF_LENGTH), around.of_shadows)
+    lobes = None if around.of_lobes is None else around.of_lobes * trust
+    return ContactFalloff(diffuse * trust, lobes)

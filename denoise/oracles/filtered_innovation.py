@@ -424,18 +424,42 @@ def contact(frame: Frame, m, name: str, length: np.ndarray) -> np.ndarray:
     """k / (2 p^2) from how far what shadow rays and paths around met is from the surface."""
     focal = (frame.screen_from_world @ np.linalg.inv(frame.camera_from_world))[0, 0]
 
-    def near(channel: str, there: np.ndarray) -> np.ndarray:
+    def near(channel: str, there: np.ndarray, alpha: np.ndarray | float = 1) -> np.ndarray:
         there = there & (frame[channel] > 0)
-        pixels = frame[channel].astype(float) * focal / np.where(there, frame["depth"], 1)
+        pixels = alpha * frame[channel].astype(float) * focal / np.where(there, frame["depth"], 1)
         c = np.where(there, 1 / (4 * pixels**2 + 1), 0)
         return spread_out(frame, c[..., None], m)[..., 0] / (2 * m.penumbra**2)
 
     seen = frame["id"] >= 0
-    of_shadows = near("blocker_distance", seen)
+    trust = length / (length + 3)
     if name == "G":
-        return of_shadows
+        if "hit_distance" not in frame or "roughness" not in frame:
+            return 0 * trust
+        alpha = roughness_of(frame)
+        return near("hit_distance", seen & (alpha < 1), alpha) * trust
     of_paths = near("hit_distance", seen) if "hit_distance" in frame else 0
-    return (of_shadows + 2 * of_paths) * length / (length + 3)
+    return (near("blocker_distance", seen) + 2 * of_paths) * trust
+
+
+def without_peaks(frame: Frame, image: np.ndarray, levels: int, m) -> tuple:
+    """Light without what is above 2.5 times the mean of the same object around, and the factor that
+    gives it back."""
+    x = np.maximum(lum(image), 0)
+    pixels = pixels_of(frame, m, x=x)
+    count, total = np.zeros(x.shape), np.zeros(x.shape)
+    for dy, dx in np.ndindex(5, 5):
+        where, p, q = pairs(pixels, x.shape, dy - 2, dx - 2)
+        if where is None or (dy, dx) == (2, 2):
+            continue
+        same = (p.id == q.id) & (p.id >= 0)
+        count[where] += same
+        total[where] += q.x * same
+    least = 2.5 * total / np.maximum(count, 1)
+    share = np.where((least > 0) & (x > least), least / np.maximum(x, 1e-30), 1)
+    before, after = np.moveaxis(smooth(frame, np.stack([x, x * share], -1), np.ones(x.shape),
+                                       levels, m), -1, 0)
+    factor = np.where(after > 0, np.clip(before / np.where(after > 0, after, 1), 1, 3), 1)
+    return image * share[..., None], factor
 
 
 def run(frames: list[Frame], m) -> np.ndarray:
@@ -564,10 +588,15 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict
                 least = min(m.mirror_sigma / sigma, 1)
                 sigmas = sigma * np.clip(roughness_of(frame) / 0.1, least, 1)
             if name in "LG" and "light" in frame and m.follow_shadows and len(signals) > 1:
-                narrow = contact(frame, m, name, n)
-            out[name] = guided(frame, history, s2, levels, sigmas, fade, narrow, m,
+                narrow = contact(frame, m, name, ns[length_of(frame, "L")])
+            before, factor = history, np.ones(found.shape)
+            if name in "LG" and "G" in signals:
+                wide = m.innovation_levels if len(signals) > 1 else m.sharp_innovation_levels
+                before, factor = without_peaks(frame, history, wide, m)
+            fade = np.ones(found.shape) if name == "G" else fade
+            out[name] = guided(frame, before, s2, levels, sigmas, fade, narrow, m,
                                np.clip(samples, 1e-5, 1) if sparse else None,
-                               {"L": 0.2, "G": 1.0}.get(name, 0))
+                               {"L": 0.2, "G": 1.0}.get(name, 0)) * factor[..., None]
             if sparse:
                 history = np.where(samples[..., None] > 1e-5, history, out[name])
             kept[name] = history, s2, np.minimum(samples, 64)

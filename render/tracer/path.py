@@ -112,6 +112,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         # Light that the last direction ran into (for depth 0: what the camera sees itself).
         surer = 1.0
         if dr.hint(lights is not None, mode="scalar"):
+            assert lights is not None
             surer = dr.select((depth == 1) & si.is_valid(), lights.emitters, 1)
         found = beta * _found_light(scene, si, previous_p, bsdf_pdf, from_delta, surer)
 

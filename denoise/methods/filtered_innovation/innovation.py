@@ -47,8 +47,9 @@ of h compares luminance too,
 
     w = h exp(-distance(q, p's plane) / (plane_pixels width(p)) - ((l(p) - l(q)) / (sigma s))^2)
 
-sigma being less for glossy light the narrower its lobe is, down to a mirror's at roughness 0,
-and its last level fades out as the history grows. A pixel of another object counts for two fifths.
+sigma being less for glossy light the narrower its lobe is, down to a mirror's at roughness 0, and
+the last level of other light fades out as the history grows. A pixel of another object counts for
+two fifths. In scenes with glossy surfaces light has no rare bright pixels before it: `peaks.py`.
 Visibility is filtered no farther than shadows are soft, and so are its e and Q: `penumbra.py`. The
 last filter of other light is narrower where other surfaces are close: `contact.py`.
 Normals are not compared: where they differ much the tangent plane is soon left, and at a crease, or

@@ -137,6 +137,14 @@ class SignalLayout:
         return [visibility if kind is SignalKind.VISIBILITY else light for kind in self.kinds]
 
     @property
+    def with_peaks(self) -> list[int]:
+        """Signals whose rare bright pixels are kept from spreading (`filters/peaks.py`): light of
+        scenes with glossy surfaces, by whose way lamps are met by chance."""
+        if SignalKind.GLOSSY not in self.kinds:
+            return []
+        return [s for s, kind in enumerate(self.kinds) if kind is not SignalKind.VISIBILITY]
+
+    @property
     def visibilities(self) -> list[int]:
         """Which signals are visibility."""
         return [s for s, kind in enumerate(self.kinds) if kind is SignalKind.VISIBILITY]

@@ -128,7 +128,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         visibility_sigma: the same of visibility [standard deviations, above 0].
         mirror_sigma: the same of what mirrors reflect, at most `light_sigma`; between the two
             where lobes are narrow [standard deviations, above 0].
-        fade_frames: history length at which the last level has faded out [frames, above 0].
+        fade_frames: history length at which the last level has faded out, but for glossy light
+            [frames, above 0].
         plane_pixels: falloff with distance from the tangent plane [widths of a pixel there,
             above 0].
         max_history_length: cap of the history length [frames, 1 to 1e6].
@@ -168,7 +169,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     texture_sigma: float = 3.5
     visibility_sigma: float = 5.0
     mirror_sigma: float = 1.6
-    fade_frames: float = 4.0
+    fade_frames: float = 8.0
     plane_pixels: float = 0.8
     max_history_length: float = 64.0
     min_cosine: float = 0.5
@@ -251,16 +252,21 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             lobes = lobes_between(previous, frame, given.lobe, surface.position, stencil)
             narrower = narrowed(given.roughness,
                                 stencil.opaque(min(self.mirror_sigma / self.light_sigma, 1)))
+        roughness = None
+        if SignalKind.GLOSSY in layout.kinds:
+            roughness = stencil.opaque(1) if given.roughness is None else given.roughness
         hit_distance = stencil.opaque(0)  # where a frame does not say
         if rays is not None and "hit_distance" in frame:
             (hit_distance,) = stencil.load(np.asarray(frame["hit_distance"], np.float32))
         evaluate(signals, given.lit, sample, plane, id_,
-                 (rays, hit_distance, surface.position) if rays else None, chosen, lobes, narrower)
+                 (rays, hit_distance, surface.position, roughness) if rays else None, chosen, lobes,
+                 narrower)
 
         plane = passes.store_surface(id_, plane)
         if given.lit is not None:
             signals = passes.with_visibility_of_unlit(signals, given.lit, plane)
-        around = passes.surroundings(rays, hit_distance, sample, surface.position, plane, chosen)
+        around = passes.surroundings(rays, hit_distance, sample, surface.position, plane, chosen,
+                                     roughness)
         innovations = passes.find_innovations(
             signals, chosen, sample, plane, motion, records, around,
             *self._reprojection_parameters(stencil), lobes,

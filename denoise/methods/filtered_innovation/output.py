@@ -92,8 +92,9 @@ def narrowed(roughness: Float, mirror: Float) -> Float:
 
 
 class _Rule(NamedTuple):
-    """How a signal's taps are weakened: by distance, and at the last level; and the variance that
-    they are judged by.
+    """How a signal's taps are weakened: by distance, and at the last level, but for glossy light,
+    whose noise is rare bright pixels that a long history holds too; and the variance that they are
+    judged by.
 
     Judged by the pixel's own, a bright pixel, which is noisy, takes from dark ones what they do not
     take from it, and light is lost. So diffuse light counts some of the neighbour's (more would
@@ -114,13 +115,13 @@ class _Rule(NamedTuple):
     def of(layout: SignalLayout, s: int, level: int, falloff: OutputFalloff,
            spacing: Float) -> _Rule:
         f, g = layout.follower(s), layout.group(s)
+        is_glossy = layout.kinds[s] is SignalKind.GLOSSY
         fade = falloff.fades[s] if g is None else falloff.sparse_fades[g]
         near = None if f is None else falloff.footprints[f]
         if falloff.contact is not None and near is None:
-            is_glossy = layout.kinds[s] is SignalKind.GLOSSY
             near = falloff.contact.glossy if is_glossy else falloff.contact.diffuse
         return _Rule(footprint(near, spacing),
-                     fade if layout.is_last_level(s, level) else None,
+                     fade if layout.is_last_level(s, level) and not is_glossy else None,
                      NEIGHBOURS_NOISE[layout.kinds[s]])
 
 

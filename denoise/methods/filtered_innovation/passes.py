@@ -8,10 +8,11 @@ from typing import Any, TypeVar
 
 import drjit as dr
 
+from onespp.denoise.filters.peaks import RADIUS, Energies, with_their_light, without_peaks
 from onespp.denoise.filters.tangent_plane import RING, Roughness, SurfaceTap, loosened, roughness
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
 from onespp.denoise.inputs.shadow_rays import ShadowRays
-from onespp.denoise.inputs.signals import Chosen, Signal
+from onespp.denoise.inputs.signals import Chosen, Signal, SignalKind
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Float, Vector3
 from onespp.denoise.jit.grid import Planes, Stencil, single
@@ -29,8 +30,8 @@ from .texture import CHOICE_RULES, RESIDUAL_RULES, Residual, residual, restored
 
 _OUTSIDE = -1e15          # 1/z outside the image
 _ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH, _ROUGH = range(4)  # planes of the surface
-_SHADOW_PLANES, _CONTACT_PLANES = 5, 2  # of `Shadows` and `Contact`
-_AROUND = [*window(1), (0, 0)]
+_SHADOW_PLANES, _CONTACT_PLANES = 5, 2  # of `Shadows` and `Contact`, but lobes
+_AROUND, _WINDOW = [*window(1), (0, 0)], [*window(RADIUS), (0, 0)]
 T = TypeVar("T")
 
 
@@ -64,6 +65,7 @@ class Passes:
     Attributes:
         surfaces: planes of object ID, 1/z, 1/z of what has a history, and `Roughness.share`.
         buffer: planes of what is being smoothed or filtered, see `layout.py`.
+        peaks: of luminance and of object ID, of the window of `filters/peaks.py`.
         around: surfaces of the 3x3 pixels around. ring: of shares of roughness.
         fill: of unlit pixels' visibility.
     """
@@ -85,6 +87,10 @@ class Passes:
     smoothing: list[Level]
     merge: Step[..., Merged]
     output: list[Level]
+    peaks: tuple[Taps[list[Float]], Taps[Float]]
+    trim: Step[..., tuple[list[Signal], Energies]]
+    energies: list[Level]
+    make_whole: Step[..., list[Signal]]
     residual: Step[..., Residual]
     residual_smoothing: list[Level]
     restore: Step[..., Signal]
@@ -94,13 +100,19 @@ class Passes:
     def make(stencil: Stencil, layout: SignalLayout) -> Passes:
         surfaces = stencil.planes([-1.0, _OUTSIDE, _OUTSIDE, 0.0])
         spread = [PlaneRule(SPREAD_LEVEL)] * (_SHADOW_PLANES * (layout.groups or 1)
-                                              + _CONTACT_PLANES)
+                                              + _CONTACT_PLANES
+                                              + layout.kinds.count(SignalKind.GLOSSY))
         buffer = stencil.planes([0.0] * max(len(layout.smoothing_rules), len(spread),
                                             layout.output_planes(layout.output_level(0))))
 
         def smoothing(i: int) -> Level:
             rules = layout.smoothing_level(i)
             return Level.make(i, buffer, len(rules), surfaces, _VALID_INVERSE_DEPTH,
+                              lambda *a: smooth_level(rules, *a))
+
+        def energies(i: int) -> Level:
+            rules = [PlaneRule(layout.innovation_levels)] * (2 * len(layout.with_peaks))
+            return Level.make(i, buffer, len(rules), surfaces, _INVERSE_DEPTH,
                               lambda *a: smooth_level(rules, *a))
 
         def output(i: int) -> Level:
@@ -134,6 +146,11 @@ class Passes:
             [smoothing(i) for i in range(layout.innovation_levels)],
             Step(lambda *a: merge(stencil, layout, *a)),
             [output(i) for i in range(layout.output_levels)],
+            (buffer.taps(_WINDOW, range(len(layout.with_peaks))),
+             surfaces.taps(_WINDOW, [_ID]).named(single)),
+            Step(without_peaks),
+            [energies(i) for i in range(layout.innovation_levels)] if layout.with_peaks else [],
+            Step(with_their_light),
             Step(residual),
             [Level.make(i, buffer, len(RESIDUAL_RULES), surfaces, _VALID_INVERSE_DEPTH,
                         lambda *a: smooth_level(RESIDUAL_RULES, *a))
@@ -159,13 +176,13 @@ class Passes:
         return [*others, visibility._replace(luminance=filled)]
 
     def surroundings(self, rays: ShadowRays | None, hit_distance: Float, surface: SurfaceSample,
-                     position: Vector3, plane: TangentPlane,
-                     chosen: Chosen | None) -> Surroundings:
+                     position: Vector3, plane: TangentPlane, chosen: Chosen | None,
+                     roughness: Float | None) -> Surroundings:
         """`look_around`, and means of it over a few pixels around."""
         if rays is None:
             return Surroundings([], None)
         return self._through([self.spread], self.look_around(rays, hit_distance, chosen, surface,
-                                                             position), plane)
+                                                             position, roughness), plane)
 
     def choose_histories(self, innovations: Innovations, plane: TangentPlane) -> Innovations:
         """With the better one of the two histories of each sparse signal, or of light with texture;
@@ -191,12 +208,32 @@ class Passes:
         before = [_counted(noisy) for noisy in merged.signals]
         if merged.parts is not None:
             before = [before[0]._replace(parts=merged.parts)]
+        before, energies = self._without_peaks(before, plane)
         filtered = self._through(self.output, before, plane, falloff, sigmas)
         if merged.parts is None:
-            return [noisy.signal for noisy in filtered]
+            output = [noisy.signal for noisy in filtered]
+            if energies is not None:
+                lights = self.make_whole([output[s] for s in self.layout.with_peaks], energies)
+                for s, light in zip(self.layout.with_peaks, lights, strict=True):
+                    output[s] = light
+            return output
         around = self._through(self.residual_smoothing, self.residual(before[0], filtered[0]),
                                plane)
         return [self.restore(before[0], filtered[0], around, innovations.lengths[0])]
+
+    def _without_peaks(self, before: list[NoisySignal],
+                       plane: TangentPlane) -> tuple[list[NoisySignal], Energies | None]:
+        """Signals without what `without_peaks` takes, and its energies, smoothed."""
+        which = self.layout.with_peaks
+        if not which:
+            return before, None
+        lights = [before[s].signal for s in which]
+        self.buffer.store([dr.maximum(light.luminance, 0) for light in lights], gutters=True)
+        lights, energies = self.trim(lights, *self.peaks)
+        before = list(before)
+        for s, light in zip(which, lights, strict=True):
+            before[s] = before[s]._replace(signal=light)
+        return before, self._through(self.energies, energies, plane)
 
     def _through(self, levels: list[Level], values: T, plane: TangentPlane,
                  *arguments: Any) -> T:

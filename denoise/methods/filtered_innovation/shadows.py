@@ -51,14 +51,15 @@ def focal_length(rays: ShadowRays) -> Float:
 
 
 def look_around(stencil: Stencil, rays: ShadowRays, hit_distance: Float, chosen: Chosen | None,
-                groups: int, surface: SurfaceSample, position: Vector3) -> Surroundings:
+                groups: int, surface: SurfaceSample, position: Vector3,
+                roughness: Float | None) -> Surroundings:
     """What each pixel knows; arguments as of `of_each_light`, `shadow_motion`, `contact_samples`.
     """
     blocked, _ = stopped(rays, surface.id)
     return Surroundings(
         of_each_light(follow_shadows(stencil, rays, surface, position), chosen, groups),
         contact_samples(blocked, rays.ray.blocker_distance, hit_distance,
-                        focal_length(rays) / surface.depth))
+                        focal_length(rays) / surface.depth, roughness))
 
 
 def of_each_light(shadows: Shadows, chosen: Chosen | None, groups: int) -> list[Shadows]:

@@ -15,11 +15,25 @@ def test_what_met_something_tells_how_many_pixels_away_it_is():
                           stencil.Float([0.5, 0.0, np.nan, np.inf]), stencil.Float(10.0))
     np.testing.assert_allclose(met.of_shadows.numpy(), [1, 0.5, 0, 0], rtol=1e-6)
     np.testing.assert_allclose(met.of_paths.numpy(), [1 / 101, 0, 0, 0], rtol=1e-6)
+    assert met.of_lobes is None
 
 
-def test_diffuse_light_narrows_with_the_length_of_its_history():
+def test_lobes_show_sharp_what_is_as_close_as_they_are_wide():
+    stencil = Stencil(1, 4, 1)
+    met = contact_samples(stencil.Float(0) > 0, stencil.Float(0),
+                          stencil.Float([0.5, 0.5, 0.5, 0.0]), stencil.Float(10.0),
+                          stencil.Float([0.0, 0.1, 1.0, 0.1]))
+    assert met.of_lobes is not None
+    np.testing.assert_allclose(met.of_lobes.numpy(), [1, 0.5, 0, 0], rtol=1e-6)
+
+
+def test_light_narrows_with_the_length_of_its_history():
     stencil = Stencil(1, 3, 1)
-    falloff = contact_falloff(Contact(stencil.Float([0.0, 0.5, 1]), stencil.Float([0, 0, 0.5])),
-                              stencil.Float([1, 1, 9]))
-    np.testing.assert_allclose(falloff.glossy.numpy(), [0, 0.5, 1], rtol=1e-6)
+    around = Contact(stencil.Float([0.0, 0.5, 1]), stencil.Float([0, 0, 0.5]))
+    lengths = stencil.Float([1, 1, 9])
+    falloff = contact_falloff(around, lengths)
     np.testing.assert_allclose(falloff.diffuse.numpy(), [0, 0.5 / 4, 2 * 9 / 12], rtol=1e-6)
+    assert falloff.glossy is None
+    falloff = contact_falloff(around._replace(of_lobes=stencil.Float([0, 0.5, 1])), lengths)
+    assert falloff.glossy is not None
+    np.testing.assert_allclose(falloff.glossy.numpy(), [0, 0.5 / 4, 9 / 12], rtol=1e-6)

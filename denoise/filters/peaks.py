@@ -1,0 +1,70 @@
+"""Rare bright pixels before the last filter: they leave no blobs, and none of their light is lost.
+
+A path that meets a lamp by a rare chance, as by way of a glossy floor, is a pixel many times as
+bright as those around. A filter that weighs by noise spreads it over its few pixels, as a blob, or
+keeps it from some of them, and so loses light. Symbols: x the luminance of the history in a pixel,
+m its mean over those of the 24 pixels around that see the same object, F the last filter, S a
+smoothing by geometry alone, as wide as that of the innovation.
+
+    x' = min(x, 2.5 m),   output = F[x'] min(S[x] / S[x'], 3)
+
+Where history is long, or light is bright for a reason, little is above 2.5 m; what is has its share
+in S of the light all around.
+
+Source: our own, of two known parts: outliers by their neighbours (as in GAMES202, lecture 13, here
+by the mean alone), and the ratio of two smoothings (Heitz et al. 2018), by which nothing is lost.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import drjit as dr
+
+from onespp.denoise.inputs.signals import Signal
+from onespp.denoise.jit.arrays import Float
+from onespp.denoise.jit.structure import mapped
+from onespp.denoise.jit.taps import Taps
+
+RADIUS = 2                     # pixels
+OUTLIER = 2.5                  # times the mean of those around
+MOST = 3.0                     # that light is multiplied by
+
+
+class Energies(NamedTuple):
+    """Luminance of each light, and of what `without_peaks` leaves of it; or smoothings of these."""
+
+    before: list[Float]
+    after: list[Float]
+
+
+def without_peaks(lights: list[Signal], luminances: Taps[list[Float]],
+                  ids: Taps[Float]) -> tuple[list[Signal], Energies]:
+    """Each light without what is above `OUTLIER` times the mean around, and its energies.
+
+    Args:
+        luminances: of the lights, at least 0. ids: of objects. Both of the window of `RADIUS`, of
+            which the last is the pixel.
+    """
+    last = len(luminances) - 1
+    center, id_ = luminances.at(last), ids.at(last)
+    sums, count = [0 * x for x in center], 0 * id_
+    for i in range(last):
+        same = (ids.at(i) == id_) & (id_ >= 0)
+        sums = [total + dr.select(same, x, 0) for total, x in zip(sums, luminances.at(i))]
+        count += dr.select(same, 1, 0)
+        luminances.next()
+    shares = []
+    for x, total in zip(center, sums):
+        least = OUTLIER * total / dr.maximum(count, 1)
+        is_peak = (x > least) & (least > 0)
+        shares.append(dr.select(is_peak, least / dr.select(is_peak, x, 1), 1))
+    kept = [mapped(lambda v, s=share: v * s, light) for light, share in zip(lights, shares)]
+    return kept, Energies(center, [x * share for x, share in zip(center, shares)])
+
+
+def with_their_light(lights: list[Signal], around: Energies) -> list[Signal]:
+    """What the last filter made of `without_peaks`, with all of the light; around: smoothed."""
+    whole = [dr.select(after > 0, dr.clip(before / dr.select(after > 0, after, 1), 1, MOST), 1)
+             for before, after in zip(around.before, around.after)]
+    return [mapped(lambda v, f=factor: v * f, light) for light, factor in zip(lights, whole)]
