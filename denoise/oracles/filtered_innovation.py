@@ -465,15 +465,16 @@ def without_peaks(frame: Frame, image: np.ndarray, levels: int, m) -> tuple:
 def run(frames: list[Frame], m) -> np.ndarray:
     """The colour of the last frame."""
     signals = [signals_of(frame) for frame in frames]
-    gloss = {}
+    gloss, has_peaks = {}, "G" in signals[0]
     if "layer_share" in frames[0]:
         gloss = filtered([seen_in_gloss(frame) for frame in frames],
-                         [{"G": each.pop("G")} for each in signals], m)
-    out = filtered(frames, signals, m) | gloss
+                         [{"G": each.pop("G")} for each in signals], m, has_peaks)
+    out = filtered(frames, signals, m, has_peaks) | gloss
     return repaid(color_of(frames[-1], out), frames[-1]["id"])
 
 
-def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict[str, np.ndarray]:
+def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
+             has_peaks: bool) -> dict[str, np.ndarray]:
     """Signals of the last frame."""
     sharp_levels = m.sharp_innovation_levels, m.sharp_output_levels
     settings = {
@@ -590,8 +591,8 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m) -> dict
             if name in "LG" and "light" in frame and m.follow_shadows and len(signals) > 1:
                 narrow = contact(frame, m, name, ns[length_of(frame, "L")])
             before, factor = history, np.ones(found.shape)
-            if name in "LG" and "G" in signals:
-                wide = m.innovation_levels if len(signals) > 1 else m.sharp_innovation_levels
+            if name in "LG" and has_peaks:
+                wide = m.innovation_levels if "L" in signals else m.sharp_innovation_levels
                 before, factor = without_peaks(frame, history, wide, m)
             fade = np.ones(found.shape) if name == "G" else fade
             out[name] = guided(frame, before, s2, levels, sigmas, fade, narrow, m,

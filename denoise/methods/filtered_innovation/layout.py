@@ -108,6 +108,7 @@ class SignalLayout:
             in the last filter. sharp_*: those of the other signals; the last filter of sparse ones
             has one level less (measured: no worse, and quicker).
         has_texture: the one signal is light whose texture is not known, see `texture.py`.
+        has_peaks: rare bright pixels of light are kept from spreading (`filters/peaks.py`).
     """
 
     kinds: tuple[SignalKind, ...]
@@ -118,6 +119,7 @@ class SignalLayout:
     output_levels: int
     sharp_output_levels: int
     has_texture: bool = False
+    has_peaks: bool = False
 
     def check(self, frame: Frame, now: SignalLayout) -> None:
         """InputError where a frame has other signals than the one before it."""
@@ -138,11 +140,9 @@ class SignalLayout:
 
     @property
     def with_peaks(self) -> list[int]:
-        """Signals whose rare bright pixels are kept from spreading (`filters/peaks.py`): light of
-        scenes with glossy surfaces, by whose way lamps are met by chance."""
-        if SignalKind.GLOSSY not in self.kinds:
-            return []
-        return [s for s, kind in enumerate(self.kinds) if kind is not SignalKind.VISIBILITY]
+        """Signals whose rare bright pixels are kept from spreading."""
+        return [s for s, kind in enumerate(self.kinds)
+                if self.has_peaks and kind is not SignalKind.VISIBILITY]
 
     @property
     def visibilities(self) -> list[int]:

@@ -289,7 +289,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
                     and self.output_levels < self.innovation_levels)
         return SignalLayout(light.kinds, light.groups, has_shadow_rays, levels,
                             min(self.sharp_innovation_levels, levels), self.output_levels + wider,
-                            self.sharp_output_levels + wider, has_texture)
+                            self.sharp_output_levels + wider, has_texture,
+                            SignalKind.GLOSSY in light.kinds)  # by whose way lamps are met
 
     def _tangent_plane(self, frame: Frame, surface: Surface, zero_albedo: Bool | None,
                        stencil: Stencil) -> TangentPlane:
