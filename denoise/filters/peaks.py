@@ -1,4 +1,4 @@
-"""Rare bright pixels before the last filter: they leave no blobs, and none of their light is lost.
+"""Rare bright pixels before the last filter: they leave no blobs, and most of their light is kept.
 
 A path that meets a lamp by a rare chance, as by way of a glossy floor, is a pixel many times as
 bright as those around. A filter that weighs by noise spreads it over its few pixels, as a blob, or
@@ -9,10 +9,11 @@ smoothing by geometry alone, as wide as that of the innovation.
     x' = min(x, 2.5 m),   output = F[x'] min(S[x] / S[x'], 3)
 
 Where history is long, or light is bright for a reason, little is above 2.5 m; what is has its share
-in S of the light all around.
+in S of the light all around. Light is lost where the limit, 3, is reached: where S reaches only few
+pixels, as on leaves and small bent things.
 
 Source: our own, of two known parts: outliers by their neighbours (as in GAMES202, lecture 13, here
-by the mean alone), and the ratio of two smoothings (Heitz et al. 2018), by which nothing is lost.
+by the mean alone), and the ratio of two smoothings (Heitz et al. 2018), which gives light back.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ def without_peaks(lights: list[Signal], luminances: Taps[list[Float]],
 
 
 def with_their_light(lights: list[Signal], around: Energies) -> list[Signal]:
-    """What the last filter made of `without_peaks`, with all of the light; around: smoothed."""
+    """What the last filter made of `without_peaks`, with its light again; around: smoothed."""
     whole = [dr.select(after > 0, dr.clip(before / dr.select(after > 0, after, 1), 1, MOST), 1)
              for before, after in zip(around.before, around.after)]
     return [mapped(lambda v, f=factor: v * f, light) for light, factor in zip(lights, whole)]
