@@ -1,24 +1,58 @@
-"""Whether Mitsuba finds all the light of a picture on a mesh.
+"""Points of meshes that shine as a picture: drawn by the picture where Mitsuba can, else by area.
 
 It picks a place of the picture and asks which face has that uv. Where several have it, only one is
-found, and where none in [0, 1]^2 has, none: such a lamp is too dark.
+found, and where none in [0, 1]^2 has, none: such a lamp would be too dark. It asks by tracing rays
+through a scene of uv, and OptiX cannot trace two scenes in one kernel: there it leaves them out.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from onespp.render.host import backend
 from onespp.scenes.description import Mesh
 
 from .variant import mi
+
+BY_AREA = "onespp_by_area"
+"""Name of the texture that says of its `picture` that it is the same all over."""
 
 _POINTS = 8  # in each face
 _OUTSIDE = 1e-6
 
 
+class _ByArea(mi.Texture):
+    """Has an area light draw points by area; each then shines as the picture does there."""
+
+    def __init__(self, properties: mi.Properties) -> None:
+        super().__init__(properties)
+        self.picture = properties["picture"]
+
+    def is_spatially_varying(self) -> bool:
+        return False
+
+    def eval(self, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> mi.Color3f:
+        return self.picture.eval(si, active)
+
+    def eval_1(self, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> mi.Float:
+        return self.picture.eval_1(si, active)
+
+    def eval_3(self, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> mi.Color3f:
+        return self.picture.eval_3(si, active)
+
+    def mean(self) -> mi.Float:
+        return self.picture.mean()
+
+
+mi.register_texture(BY_AREA, _ByArea)
+
+
 def is_found(mesh: mi.Mesh, geometry: Mesh) -> bool:
-    """Whether each face of a mesh is the one that has its uv, by some points in each."""
-    if geometry.uv is None:
+    """Whether points may be drawn by the picture: each face is the one that has its uv.
+
+    By some points in each face.
+    """
+    if geometry.uv is None or mi.variant() == backend.VARIANTS["cuda"]:
         return False
     corners = geometry.uv[geometry.faces]
     if corners.min() < -_OUTSIDE or corners.max() > 1 + _OUTSIDE:

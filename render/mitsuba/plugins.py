@@ -25,6 +25,7 @@ from onespp.scenes import validity
 from onespp.scenes.description import SceneError
 from onespp.scenes.validity import Place
 
+from . import pictured_lamps
 from .variant import mi
 
 _SPECIAL = ("rgb", "spectrum")  # textures that are no plugins but forms of a value
@@ -51,10 +52,15 @@ def bsdf(material: Mapping[str, Any], what: str) -> Any:
     return loaded
 
 
-def area_light(radiance: Any, what: str) -> Any:
-    """An area emitter of a colour, an image or a texture's dictionary."""
-    loaded = _load({"type": "area", "radiance": plugin(radiance, Place(what), validity.RADIANCE)},
-                   what)
+def area_light(radiance: Any, what: str, by_area: bool = False) -> Any:
+    """An area emitter of a colour, an image or a texture's dictionary.
+
+    by_area: its points are drawn by area (`pictured_lamps`), not by the radiance of an image.
+    """
+    made = plugin(radiance, Place(what), validity.RADIANCE)
+    if by_area:
+        made = {"type": pictured_lamps.BY_AREA, "picture": made}
+    loaded = _load({"type": "area", "radiance": made}, what)
     try:
         with _tried(what):
             loaded.eval(_surface())

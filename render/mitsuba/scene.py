@@ -242,27 +242,22 @@ class MitsubaScene:
     def _load_mesh(self, shape: Shape, local: np.ndarray, parts: dict[str, Any]) -> mi.Mesh:
         geometry = shape.geometry
         assert isinstance(geometry, Mesh)
-        properties = mi.Properties()
-        for name, part in parts.items():
-            properties[name] = part
-        mesh = _built(self._ids[shape.name], _buffers(geometry, local), properties)
+        buffers = _buffers(geometry, local)
+        mesh = _built(self._ids[shape.name], buffers, _properties(parts))
         emitter = parts.get("emitter")
         if (emitter is not None
                 and mi.has_flag(emitter.flags(), mi.EmitterFlags.SpatiallyVarying)
                 and not pictured_lamps.is_found(mesh, geometry)):
-            raise SceneError(f"the emission of shape '{shape.name}' is a texture on a mesh, whose "
-                             "faces share its places or lie outside of it: use one colour there, "
-                             "uv in [0, 1] of which no two faces have the same, or another shape, "
-                             "such as a Rectangle")
+            parts["emitter"] = plugins.area_light(
+                shape.emission_at(0), f"the emission of shape '{shape.name}'", by_area=True)
+            return _built(self._ids[shape.name], buffers, _properties(parts))
         return mesh
 
     def _load_merged(self, name: str, group: Sequence[Shape]) -> mi.Mesh:
         """Still meshes of one material as one."""
-        properties = mi.Properties()
-        properties["bsdf"] = self._bsdf(group[0])
         return _built(name, merged.joined([
             _buffers(cast(Mesh, shape.geometry), self._local(shape.world_from_object_at(0)))
-            for shape in group]), properties)
+            for shape in group]), _properties({"bsdf": self._bsdf(group[0])}))
 
     def _place(self, shape: Shape, world_from_object: np.ndarray) -> None:
         local = self._local(world_from_object)
@@ -359,6 +354,13 @@ def _placed(mesh: Mesh, matrix: np.ndarray) -> dict[str, np.ndarray]:
 def _buffers(mesh: Mesh, matrix: np.ndarray) -> dict[str, np.ndarray]:
     """All buffers of a mesh at a place."""
     return ({} if mesh.uv is None else {"vertex_texcoords": mesh.uv}) | _placed(mesh, matrix)
+
+
+def _properties(parts: dict[str, Any]) -> mi.Properties:
+    properties = mi.Properties()
+    for name, part in parts.items():
+        properties[name] = part
+    return properties
 
 
 def _built(name: str, buffers: dict[str, np.ndarray], properties: Any) -> mi.Mesh:

@@ -13,7 +13,6 @@ import pytest
 from onespp.render.errors import InputError
 from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.tracer.renderer import Renderer
-from onespp.scenes import meshes
 from onespp.scenes.description import (
     Camera,
     Cylinder,
@@ -281,19 +280,6 @@ def test_environment_image_of_any_size_and_file(size, tmp_path):
 def test_environment_that_cannot_be_is_refused(environment, words):
     refused(lambda: MitsubaScene(scene(environment=environment)),
             "environment of scene 't'", *words)
-
-
-def test_a_picture_on_a_mesh_must_lie_there_once():
-    """Six sides of a box share their uv, and five would not be found: 30 % too dark."""
-    def lamp(geometry: Mesh) -> Scene:
-        return scene(geometry=geometry, emission=np.ones((2, 2, 3)), name="lamp")
-
-    refused(lambda: MitsubaScene(lamp(meshes.box((1, 1, 1)))), "lamp", "no two faces")
-    ring = meshes.torus(1, 0.3)
-    assert ring.uv is not None
-    MitsubaScene(lamp(ring))
-    refused(lambda: MitsubaScene(lamp(Mesh(ring.vertices, ring.faces, ring.normals, 2 * ring.uv))),
-            "lamp", "outside")
 
 
 @pytest.mark.parametrize(("light", "words"), [

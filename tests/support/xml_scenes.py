@@ -326,10 +326,10 @@ def write_obj(path: Path, mesh: Mesh, normals: bool = True) -> None:
         *("f " + " ".join(corner.format(i + 1) for i in face) for face in mesh.faces), ""]))
 
 
-def write_quad(path: Path) -> None:
-    """The square [-1, 1]^2 as an OBJ whose uv cover a picture once."""
-    path.write_text("v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
-                    "f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n")
+def write_quad(path: Path, uv: int = 1) -> None:
+    """The square [-1, 1]^2 as an OBJ whose picture lies as on a rectangle, once, or uv^2 times."""
+    path.write_text("v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\n"
+                    f"vt 0 {uv}\nvt {uv} {uv}\nvt {uv} 0\nvt 0 0\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n")
 
 
 def write_ply(path: Path, mesh: Mesh) -> None:

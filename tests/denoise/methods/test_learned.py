@@ -81,9 +81,11 @@ def test_agrees_with_the_formula_in_float64(kind, files, frames):
 
 
 @each_kind
-def test_the_network_of_kernels_agrees_before_anything_holds_its_result(kind, files, frames):
+@pytest.mark.parametrize("layout", [None, "gather"])  # the latter is what a GPU has
+def test_the_network_of_kernels_agrees_before_anything_holds_its_result(
+        kind, layout, files, frames):
     network, planes = read_network(files[kind]), planes_of(frames, kind)
-    stencil = Stencil(planes.shape[1], planes.shape[2], 1)
+    stencil = Stencil(planes.shape[1], planes.shape[2], 1, layout=layout)
     pyramid, memory, images = Pyramid.make(stencil, network), [], []
     for image in planes.astype(np.float32):
         lanes = [x + 0 for x in stencil.load(image)]
@@ -101,8 +103,9 @@ def test_what_is_trained_is_what_denoises(kind, files, frames):
     from onespp.training.forward import forward
 
     weights, planes = read_network(files[kind]).weights, planes_of(frames[:2], kind)
-    found = jax.jit(lambda w, x: forward(NETWORKS[kind], w, x))(weights,
-                                                                 planes[None].astype(np.float32))
+    with jax.default_matmul_precision("float32"):  # a GPU would take ten bits
+        found = jax.jit(lambda w, x: forward(NETWORKS[kind], w, x))(
+            weights, planes[None].astype(np.float32))
     np.testing.assert_allclose(found[0], ORACLES[kind](weights, planes), atol=1e-4)
 
 
