@@ -53,7 +53,7 @@ from onespp.render.host import backend
 from onespp.render.host.versions import versions
 from onespp.user_code import is_file
 
-from .peers import oidn
+from .peers import oidn, optix
 
 OUTLIERS = "+outliers"
 """Ends the name of a method before which outliers are removed."""
@@ -248,8 +248,8 @@ class Peer:
     about: str
 
 
-def _has_cuda() -> bool:
-    return backend.choose() == "cuda"
+def _has_optix() -> bool:
+    return backend.choose() == "cuda" and optix.has_weights()
 
 
 def _has_oidn() -> bool:
@@ -263,8 +263,8 @@ PEERS: Mapping[str, Peer] = MappingProxyType({
     **{name: Peer(kind, _has_oidn, (kind.__doc__ or "").splitlines()[0])
        for name, kind in (("oidn-split", OidnSplit), ("temporal-oidn", TemporalOidn),
                           ("temporal-oidn-split", TemporalOidnSplit))},
-    "optix": Peer(Optix, _has_cuda, "NVIDIA's OptiX denoiser, frame by frame."),
-    "optix-temporal": Peer(partial(Optix, temporal=True), _has_cuda,
+    "optix": Peer(Optix, _has_optix, "NVIDIA's OptiX denoiser, frame by frame."),
+    "optix-temporal": Peer(partial(Optix, temporal=True), _has_optix,
                            "NVIDIA's OptiX denoiser with its last result."),
 })
 

@@ -27,6 +27,7 @@ from onespp.denoise.inputs.signals import USED
 from onespp.denoise.peers.oidn import AVAILABLE
 from onespp.denoise.report.bench_table import print_bench, print_scaling
 from onespp.render.channels import GROUPED, LAYER, REPLAY, SHADOW
+from onespp.render.host import backend
 
 KERNEL_MS, CALL_MS = 4.0, 10.0
 
@@ -123,7 +124,8 @@ def test_scaling_has_every_kernel_at_every_size(clock, monkeypatch, some):
     assert "6250.0" in out.getvalue()
 
 
-def test_measuring_with_one_thread_leaves_the_number_of_threads():
+def test_measuring_with_one_thread_leaves_the_number_of_threads(monkeypatch):
+    monkeypatch.setattr(backend, "choose", lambda: "llvm")
     seen = []
     run: Any = SimpleNamespace(one_thread_ms=seen,
                                measure_kernel=lambda i: float(dr.thread_count()))

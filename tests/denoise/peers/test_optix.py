@@ -7,7 +7,7 @@ import os
 import numpy as np
 import pytest
 
-from onespp.denoise.catalog import build
+from onespp.denoise.catalog import PEERS, build
 from onespp.denoise.peers import optix
 from onespp.denoise.peers.optix import _flow
 from onespp.render.errors import InputError
@@ -23,9 +23,10 @@ needs_cuda = pytest.mark.skipif(
 
 def test_a_driver_without_the_network_is_said_in_a_sentence(monkeypatch, tmp_path):
     """OptiX itself would end the process."""
-    monkeypatch.setattr(optix.backend, "choose", lambda: "cuda")
+    monkeypatch.setattr(optix.backend, "choose", lambda device="auto": "cuda")
     monkeypatch.setattr(optix.sys, "platform", "linux")
     monkeypatch.setattr(optix, "WEIGHTS", tmp_path / "nvoptix.bin")
+    assert not PEERS["optix"].available()  # so that `--method all` goes without it
     with pytest.raises(InputError, match=r"nvoptix\.bin.*driver"):
         build("optix").init(H, W)
 

@@ -31,7 +31,7 @@ def one_sentence(text: str) -> bool:
 @pytest.mark.parametrize("path", list(map(str, OLD[-1:])))
 def test_an_old_llvm_is_refused_in_a_sentence(path, tmp_path):
     done = onespp("render", "box", "--out", str(tmp_path / "a"), "--size", "8x8",
-                  DRJIT_LIBLLVM_PATH=path)
+                  DRJIT_LIBLLVM_PATH=path, ONESPP_DEVICE="llvm")
     assert done.returncode == 2
     assert one_sentence(done.stderr)
     assert path in done.stderr
@@ -44,7 +44,7 @@ def test_a_wrong_llvm_path_is_refused_in_a_sentence(make, tmp_path):
     path = tmp_path / "libLLVM.so"
     make(path)
     done = onespp("render", "box", "--out", str(tmp_path / "a"), "--size", "8x8",
-                  DRJIT_LIBLLVM_PATH=str(path))
+                  DRJIT_LIBLLVM_PATH=str(path), ONESPP_DEVICE="llvm")
     assert done.returncode == 2
     assert one_sentence(done.stderr)
 
