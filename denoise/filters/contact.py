@@ -14,6 +14,12 @@ the less noise is there that would want a wider filter. c_l is as c_h is with al
 being the roughness: a lobe shows what is d away blurred over as many pixels, and sharp what is
 close, as the dark slit between a thing and the glossy floor on which it stands.
 
+Slits narrower than a pixel are seen by one frame and missed by the next, so that neither history
+nor neighbours know how dark it is there; the pixel's own rays do. With c_s and c_h its own, x the
+luminance of the result and y that of the frame, both with emission, the result is
+
+    C (1 - k (1 - min(y / x, 1))),    k = 3/4 sqrt(min(c_s, c_h)).
+
 Source: the idea is that of Mehta et al. 2013, "Axis-aligned filtering for interactive
 physically-based diffuse indirect lighting", where a filter is as wide as the nearest surface is
 away, by bounds over pixels; the mean, which one lone ray hardly moves, is our own.
@@ -25,10 +31,12 @@ from typing import NamedTuple
 
 import drjit as dr
 
-from onespp.denoise.jit.arrays import Bool, Float
+from onespp.denoise.jit.arrays import Bool, Color, Float
+from onespp.denoise.jit.color import luminance
 
 OF_PATHS = 2.0
 HALF_LENGTH = 3.0              # frames
+IN_SLIT = 0.75                 # most that a pixel takes of its own frame
 
 
 class Contact(NamedTuple):
@@ -75,3 +83,16 @@ def contact_falloff(around: Contact, length: Float) -> ContactFalloff:
     diffuse = dr.fma(OF_PATHS, around.of_paths, around.of_shadows)
     lobes = None if around.of_lobes is None else around.of_lobes * trust
     return ContactFalloff(diffuse * trust, lobes)
+
+
+def dark_in_slits(image: Color, frame: Color, own: Contact) -> Color:
+    """The result, darker where the pixel's own rays met something at once.
+
+    Args:
+        frame: colour of the frame. own: `contact_samples` of its pixels.
+    """
+    before, seen = luminance(image), luminance(frame)
+    ratio = dr.select(before > 0, seen / dr.select(before > 0, before, 1), 1)
+    share = IN_SLIT * dr.sqrt(dr.minimum(own.of_shadows, own.of_paths))
+    left = dr.fma(dr.clip(ratio, 0, 1) - 1, share, 1)
+    return Color(*[c * left for c in image])

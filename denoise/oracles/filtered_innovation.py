@@ -420,14 +420,47 @@ def narrowness(frame: Frame, told: np.ndarray, m) -> np.ndarray:
     return np.where(share > 1e-3, around[..., 1] / np.maximum(share, 1e-3), 0) / (2 * m.penumbra**2)
 
 
+def met_near(frame: Frame, channel: str, there: np.ndarray,
+             alpha: np.ndarray | float = 1) -> np.ndarray:
+    """1 / ((2 alpha x)^2 + 1) of what a pixel's ray met, x pixels away, 0 where it met nothing."""
+    focal = (frame.screen_from_world @ np.linalg.inv(frame.camera_from_world))[0, 0]
+    there = there & (frame[channel] > 0)
+    pixels = alpha * frame[channel].astype(float) * focal / np.where(there, frame["depth"], 1)
+    return np.where(there, 1 / (4 * pixels**2 + 1), 0)
+
+
+def in_slits(frame: Frame, image: np.ndarray, m) -> np.ndarray:
+    """Darker, as the frame is, where both of a pixel's rays met something at once."""
+    if "light" not in frame or "hit_distance" not in frame or not m.follow_shadows:
+        return image
+    seen = frame["id"] >= 0
+    near = np.minimum(met_near(frame, "blocker_distance", seen),
+                      met_near(frame, "hit_distance", seen))
+    x, y = luminance(image), luminance(frame["color"].astype(float))
+    ratio = np.where(x > 0, np.clip(y / np.where(x > 0, x, 1), 0, 1), 1)
+    return image * (1 - 0.75 * np.sqrt(near) * (1 - ratio))[..., None]
+
+
+def facing_away(frame: Frame, image: np.ndarray) -> np.ndarray:
+    """With means of the frame's colour where it reflects nothing and faces away, 7x7 pixels."""
+    if "albedo" not in frame:
+        return image
+    eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
+    cosine = ((eye - frame["position"]) * frame["normal"]).sum(-1)
+    away = (frame["id"] >= 0) & (frame["albedo"] < 0.01).all(-1) & (
+        cosine < -1e-3 * frame["depth"])
+    out = image.copy()
+    for y, x in np.argwhere(away):
+        part = np.s_[max(y - 3, 0):y + 4, max(x - 3, 0):x + 4]
+        alike = away[part] & (frame["id"][part] == frame["id"][y, x])
+        out[y, x] = frame["color"][part][alike].astype(float).mean(0)
+    return out
+
+
 def contact(frame: Frame, m, name: str, length: np.ndarray) -> np.ndarray:
     """k / (2 p^2) from how far what shadow rays and paths around met is from the surface."""
-    focal = (frame.screen_from_world @ np.linalg.inv(frame.camera_from_world))[0, 0]
-
     def near(channel: str, there: np.ndarray, alpha: np.ndarray | float = 1) -> np.ndarray:
-        there = there & (frame[channel] > 0)
-        pixels = alpha * frame[channel].astype(float) * focal / np.where(there, frame["depth"], 1)
-        c = np.where(there, 1 / (4 * pixels**2 + 1), 0)
+        c = met_near(frame, channel, there, alpha)
         return spread_out(frame, c[..., None], m)[..., 0] / (2 * m.penumbra**2)
 
     seen = frame["id"] >= 0
@@ -470,7 +503,8 @@ def run(frames: list[Frame], m) -> np.ndarray:
         gloss = filtered([seen_in_gloss(frame) for frame in frames],
                          [{"G": each.pop("G")} for each in signals], m, has_peaks)
     out = filtered(frames, signals, m, has_peaks) | gloss
-    return repaid(color_of(frames[-1], out), frames[-1]["id"])
+    color = facing_away(frames[-1], in_slits(frames[-1], color_of(frames[-1], out), m))
+    return repaid(color, frames[-1]["id"])
 
 
 def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,

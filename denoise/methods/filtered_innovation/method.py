@@ -23,6 +23,8 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.filters.atrous import BACKGROUND, LARGEST_LEVELS
+from onespp.denoise.filters.contact import contact_samples, dark_in_slits
+from onespp.denoise.filters.facing_away import colors_facing_away
 from onespp.denoise.geometry.cameras import pixel_angle
 from onespp.denoise.history.records import RecordState, no_history
 from onespp.denoise.history.reflections import lobes_between
@@ -30,7 +32,8 @@ from onespp.denoise.history.reprojection import ReprojectionTests, motion_betwee
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
 from onespp.denoise.inputs.demodulation import read_texture
 from onespp.denoise.inputs.layers import surface_of_gloss
-from onespp.denoise.inputs.shadow_rays import ShadowRays, has_shadow_rays, read_shadow_rays
+from onespp.denoise.inputs.repair import repair
+from onespp.denoise.inputs.shadow_rays import ShadowRays, has_shadow_rays, read_shadow_rays, stopped
 from onespp.denoise.inputs.signals import (
     USED,
     Chosen,
@@ -58,6 +61,7 @@ from .layout import ENERGY_LEVELS, History, SignalLayout
 from .merging import Gains
 from .output import narrowed
 from .passes import Passes
+from .shadows import focal_length
 from .texture import LEVELS, at_rest_between
 
 _LAMP = 2 * BACKGROUND    # 1/z where albedo is 0: far from any plane, and from background
@@ -75,6 +79,7 @@ class InnovationState(RecordState[Passes]):
 class _Given(NamedTuple):
     """Signals of one surface, and what is known of them.
 
+    away: 1 where the surface reflects nothing and its normal faces away from the camera, else 0.
     roughness, lobe: as of `Signals`, where there is glossy light; its image is the sharper the less
     the former is, its history the longer the more the latter is.
     """
@@ -85,8 +90,10 @@ class _Given(NamedTuple):
     chosen: Chosen | None
     surface: Surface
     zero_albedo: Bool | None
+    away: Float | None
     lit: Float | None
     rays: ShadowRays | None
+    hit_distance: Float
     roughness: Float | None
     lobe: Float | None
 
@@ -214,24 +221,35 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         rays = None
         if self.follow_shadows and light.unshadowed and has_shadow_rays(frame):
             rays = read_shadow_rays(frame, previous, stencil)
-        layout = self._layout(light, rays is not None, stencil)
+        hit_distance = stencil.opaque(0)  # where a frame does not say
+        if rays is not None and "hit_distance" in frame:
+            (hit_distance,) = stencil.load(np.asarray(frame["hit_distance"], np.float32))
+        layout, away = self._layout(light, rays is not None, stencil), None
+        if light.texture.zero_albedo is not None:
+            away = dr.select(light.texture.zero_albedo & (surface.plane_distance > 0),
+                             stencil.Float(1), 0)
+
+        def finished(output: list[Signal]) -> Color:
+            image = _dark_in_slits(light.color(output), color, rays, hit_distance, surface)
+            return _dark_facing_away(image, frame, away, stencil)
+
         if of_gloss is None or SignalKind.GLOSSY not in layout.kinds:
             output, after = self._filtered(_Given(
                 frame, layout, light.listed, light.chosen, surface, light.texture.zero_albedo,
-                light.lit, rays, light.roughness, light.lobe), state)
-            return light.color(output), replace(after, layered=None)
+                away, light.lit, rays, hit_distance, light.roughness, light.lobe), state)
+            return finished(output), replace(after, layered=None)
         signals, glossy = list(light.listed), layout.kinds.index(SignalKind.GLOSSY)
         rest, alone = layout.without_gloss()
         (gloss,), layered = self._filtered(_Given(
             of_gloss, alone, [signals.pop(glossy)], None, read_surface(of_gloss, stencil),
-            read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, None,
-            light.roughness, light.lobe),
+            read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, None, None,
+            hit_distance, light.roughness, light.lobe),
             state.layered or InnovationState(stencil, no_history(stencil)))
         output, after = self._filtered(_Given(
-            frame, rest, signals, light.chosen, surface, light.texture.zero_albedo, light.lit, rays,
-            None, None), state)
+            frame, rest, signals, light.chosen, surface, light.texture.zero_albedo, away, light.lit,
+            rays, hit_distance, None, None), state)
         output.insert(glossy, gloss)
-        return light.color(output), replace(after, layered=layered)
+        return finished(output), replace(after, layered=layered)
 
     def _filtered(self, given: _Given, state: InnovationState,
                   ) -> tuple[list[Signal], InnovationState]:
@@ -255,10 +273,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         roughness = None
         if SignalKind.GLOSSY in layout.kinds:
             roughness = stencil.opaque(1) if given.roughness is None else given.roughness
-        hit_distance = stencil.opaque(0)  # where a frame does not say
-        if rays is not None and "hit_distance" in frame:
-            (hit_distance,) = stencil.load(np.asarray(frame["hit_distance"], np.float32))
-        evaluate(signals, given.lit, sample, plane, id_,
+        hit_distance = given.hit_distance
+        evaluate(signals, given.away, given.lit, sample, plane, id_,
                  (rays, hit_distance, surface.position, roughness) if rays else None, chosen, lobes,
                  narrower)
 
@@ -332,3 +348,30 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         return [stencil.opaque(math.sqrt(LOG2E) / sigma)
                 for sigma in layout.each(self.texture_sigma if layout.has_texture
                                          else self.light_sigma, self.visibility_sigma)]
+
+
+def _dark_in_slits(image: Color, color: Color, rays: ShadowRays | None, hit_distance: Float,
+                   surface: Surface) -> Color:
+    """`dark_in_slits`, where a frame tells of its rays; color: of the frame."""
+    if rays is None:
+        return image
+    sample = surface.sample
+    blocked, _ = stopped(rays, type(hit_distance)(sample.id))
+    return dark_in_slits(image, color, contact_samples(
+        blocked, rays.ray.blocker_distance, hit_distance, focal_length(rays) / sample.depth))
+
+
+def _dark_facing_away(image: Color, frame: Frame, away: Float | None, stencil: Stencil) -> Color:
+    """`colors_facing_away` in their places; away: 1 there, evaluated."""
+    if away is None or not dr.any(away > 0):
+        return image
+    mask = stencil.rows(away.numpy()) > 0
+    own = colors_facing_away(repair(np.asarray(frame["color"], np.float32), frame["id"]),
+                             frame["id"], mask)
+    rows, columns = np.nonzero(mask)
+    lanes = stencil.UInt((rows * stencil.stride + columns).astype(np.uint32))
+    image = Color(*[c + 0 for c in image])
+    dr.eval(image)
+    for c, values in zip(image, own.T, strict=True):
+        dr.scatter(c, stencil.Float(np.ascontiguousarray(values)), lanes)
+    return image

@@ -137,6 +137,23 @@ def test_of_leaves_it_is_the_formula_in_float64():
     np.testing.assert_allclose(image, expected, rtol=1e-3, atol=5e-5)
 
 
+def test_what_reflects_nothing_and_faces_away_has_the_colour_of_its_frame():
+    """The formula, and not that of what faces the camera."""
+    frames = []
+    for i, frame in enumerate(split(19, 26)):
+        rng = np.random.default_rng(i)
+        turned = (rng.random((19, 26, 1)) < 0.5) & (frame["albedo"] == 0).all(-1, keepdims=True)
+        frames.append(with_images(
+            frame, normal=np.where(turned, -frame["normal"], frame["normal"])))
+    away = turned[..., 0] & (frames[-1]["id"] >= 0)
+    assert 5 < away.sum() < 40
+    method = FilteredInnovation()
+    image, _ = run(method, frames)
+    expected = innovation_oracle.run(frames, method)
+    np.testing.assert_allclose(image, expected, rtol=1e-3, atol=5e-5)
+    assert np.abs(run(method, split(19, 26))[0] - image)[away].max() > 0.1
+
+
 def test_pixels_without_unshadowed_light_take_no_visibility_from_their_neighbours():
     frame = split(12, 16, 1, lobes=False)[0]
     rows, columns = np.mgrid[:12, :16]
