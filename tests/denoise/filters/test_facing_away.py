@@ -9,7 +9,8 @@ from onespp.denoise.filters.facing_away import RADIUS, colors_facing_away
 
 def test_it_is_the_mean_of_those_around_that_face_away_and_are_of_one_object():
     rng = np.random.default_rng(2)
-    color, ids, away = rng.random((9, 12, 3)), rng.integers(0, 2, (9, 12)), rng.random((9, 12)) < 0.3
+    color, ids = rng.random((9, 12, 3)), rng.integers(0, 2, (9, 12))
+    away = rng.random((9, 12)) < 0.3
     found = colors_facing_away(color, ids, away)
     for (y, x), value in zip(np.argwhere(away), found, strict=True):
         those = [color[v, u] for v, u in np.argwhere(away)

@@ -299,7 +299,7 @@ def test_albedo_is_zero_where_what_has_no_back_is_seen_from_behind(material, exp
 
 @pytest.mark.parametrize("both", [False, True])
 def test_albedo_is_zero_where_the_smooth_normal_of_a_face_faces_away(both):
-    """An octahedron with the normals of a ball: at its silhouettes, and nothing comes from there."""
+    """An octahedron with the normals of a ball: at its silhouettes, from where no light comes."""
     points = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1.0)])
     faces = [(a, b, c) if (a == 0) ^ (b == 2) ^ (c == 4) else (a, c, b)
              for a in (0, 1) for b in (2, 3) for c in (4, 5)]
