@@ -18,6 +18,12 @@ Rays to one of several groups of lights are few, and near a contact those that w
 have gone to others. What stands in the way of one light is likely to be in that of another: q of a
 group is at least three tenths of that of all rays. Our own.
 
+Where w is far below a pixel a shadow is as hard as a ray, and what a pixel's own ray met there is
+all of its visibility, while history is of places a part of a pixel away. With q of its own ray, 0
+unless that was stopped, the visibility that is looked at is
+
+    V (1 - 3/4 q^8).
+
 Source: Mehta et al. 2012, "Axis-Aligned Filtering for Interactive Sampled Soft Shadows", which
 takes the extremes of d around a pixel, not a mean, and filters by this width alone.
 """
@@ -33,6 +39,7 @@ from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import mapped
 from onespp.render.channels import SUN
 
+IN_HARD_SHADOW = 0.75          # most that a stopped ray takes off its pixel's visibility
 _OF_ALL = 0.3                  # share of q of all rays that q of a group is at least
 
 
@@ -82,3 +89,8 @@ def footprint_falloffs(around: list[PenumbraSample], scale: Float,
     together = mapped(lambda *of_each: sum(of_each), *around)
     least = _OF_ALL * footprint_falloff(together, scale, min_share)
     return [dr.maximum(falloff, least) for falloff in falloffs]
+
+
+def left_in_hard_shadow(inverse_width: Float) -> Float:
+    """What is left of a pixel's visibility; inverse_width: q of its own ray."""
+    return dr.fma(dr.square(dr.square(dr.square(inverse_width))), -IN_HARD_SHADOW, 1)

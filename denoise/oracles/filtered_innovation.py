@@ -78,6 +78,7 @@ def layer_texture_of(frame: Frame) -> np.ndarray:
 def seen_in_gloss(frame: Frame) -> Frame:
     """The frame with the surfaces that glossy light is from."""
     images, seen = dict(frame.images), layers_of(frame)
+    del images["unshadowed"]  # what faces away counts for the rest of the light
     for name in ("id", "normal", "depth"):
         images[name] = images[name].copy()
         images[name][seen] = frame[f"layer_{name}"][seen]
@@ -122,7 +123,16 @@ def color_of(frame: Frame, signals: dict[str, np.ndarray]) -> np.ndarray:
 def kind_of(frame: Frame) -> np.ndarray:
     """Background, lamps and the rest: only like pixels mix."""
     black = "albedo" in frame and (frame["albedo"] < 0.01).all(-1)
-    return np.where(frame["id"] < 0, 0, np.where(black, 1, 2))
+    return np.where(frame["id"] < 0, 0, np.where(black | faces_away(frame), 1, 2))
+
+
+def faces_away(frame: Frame) -> np.ndarray:
+    """Where a surface that Mitsuba lit has a normal that faces away from the camera."""
+    if "unshadowed" not in frame:
+        return np.zeros(frame["id"].shape, bool)
+    eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
+    cosine = ((eye - frame["position"]) * frame["normal"]).sum(-1)
+    return (frame["id"] >= 0) & (cosine < -1e-3 * frame["depth"])
 
 
 def geometry(p: Pixels, q: Pixels, dy: int, dx: int, m) -> np.ndarray:
@@ -405,6 +415,14 @@ def light_sizes(frame: Frame) -> dict[int, float]:
 
 def narrowness(frame: Frame, told: np.ndarray, m) -> np.ndarray:
     """q / (2 p^2) from the widths of the penumbras around, 0 where nothing is in the way."""
+    stopped, q = sharpness(frame, told)
+    around = spread_out(frame, np.stack([stopped, q], -1), m)
+    share = around[..., 0]
+    return np.where(share > 1e-3, around[..., 1] / np.maximum(share, 1e-3), 0) / (2 * m.penumbra**2)
+
+
+def sharpness(frame: Frame, told: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Whether each pixel's ray was stopped, and 1 / (w^2 + 1) of its penumbra, 0 elsewhere."""
     stopped = told & (frame["id"] >= 0) & (frame["blocker_distance"] > 0)
     sizes = light_sizes(frame)
     size = np.vectorize(lambda i: sizes.get(int(i), np.inf))(frame["light_id"])
@@ -415,9 +433,7 @@ def narrowness(frame: Frame, told: np.ndarray, m) -> np.ndarray:
     with np.errstate(invalid="ignore", divide="ignore"):
         width = size * d / ((whole - d) * cosine) * focal / frame["depth"]
     q = np.where(stopped, 1 / (width**2 + 1), 0)
-    around = spread_out(frame, np.stack([stopped, q], -1), m)
-    share = around[..., 0]
-    return np.where(share > 1e-3, around[..., 1] / np.maximum(share, 1e-3), 0) / (2 * m.penumbra**2)
+    return stopped, q
 
 
 def met_near(frame: Frame, channel: str, there: np.ndarray,
@@ -441,15 +457,9 @@ def in_slits(frame: Frame, image: np.ndarray, m) -> np.ndarray:
     return image * (1 - 0.75 * np.sqrt(near) * (1 - ratio))[..., None]
 
 
-def facing_away(frame: Frame, image: np.ndarray) -> np.ndarray:
-    """With means of the frame's colour where it reflects nothing and faces away, 7x7 pixels."""
-    if "albedo" not in frame:
-        return image
-    eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
-    cosine = ((eye - frame["position"]) * frame["normal"]).sum(-1)
-    away = (frame["id"] >= 0) & (frame["albedo"] < 0.01).all(-1) & (
-        cosine < -1e-3 * frame["depth"])
-    out = image.copy()
+def own_colour_facing_away(frame: Frame, image: np.ndarray) -> np.ndarray:
+    """With means of the frame's colour where it faces away, over 7x7 pixels."""
+    away, out = faces_away(frame), image.copy()
     for y, x in np.argwhere(away):
         part = np.s_[max(y - 3, 0):y + 4, max(x - 3, 0):x + 4]
         alike = away[part] & (frame["id"][part] == frame["id"][y, x])
@@ -503,7 +513,12 @@ def run(frames: list[Frame], m) -> np.ndarray:
         gloss = filtered([seen_in_gloss(frame) for frame in frames],
                          [{"G": each.pop("G")} for each in signals], m, has_peaks)
     out = filtered(frames, signals, m, has_peaks) | gloss
-    color = facing_away(frames[-1], in_slits(frames[-1], color_of(frames[-1], out), m))
+    if "light" in frames[-1] and m.follow_shadows:
+        for name in unshadowed_of(frames[-1]):
+            own = frames[-1]["group"] == int(name) if name.isdigit() else True
+            _, q = sharpness(frames[-1], own & np.ones(frames[-1]["id"].shape, bool))
+            out[name] = out[name] * (1 - 0.75 * q**8)[..., None]
+    color = own_colour_facing_away(frames[-1], in_slits(frames[-1], color_of(frames[-1], out), m))
     return repaid(color, frames[-1]["id"])
 
 

@@ -119,12 +119,7 @@ class Appearance:
         return dr.select(valid, n, 0)
 
     def albedo(self, si: mi.SurfaceInteraction3f) -> mi.Color3f:
-        """Diffuse reflectance, 1 where there is no diffuse lobe, 0 where there is no surface.
-
-        Also 0 where what is opaque shows (next to) nothing: where a material without a back is seen
-        from there, and where the shading normal faces away from who sees the surface, at
-        silhouettes of smooth meshes. Light would have to come through it.
-        """
+        """Diffuse reflectance, 1 where there is no diffuse lobe, 0 where there is no surface."""
         valid, bsdf = si.is_valid(), si.bsdf()
         diffuse = mi.has_flag(bsdf.flags(), mi.BSDFFlags.DiffuseReflection)
         value = dr.select(diffuse, mi.Color3f(bsdf.eval_diffuse_reflectance(si, valid)), 1)
@@ -135,12 +130,7 @@ class Appearance:
                 here = valid & (row == number)
                 found, share = _diffuse(one, si, here)
                 value = dr.select(here, dr.select(share > 0, found, 1), value)
-        flags, n = bsdf.flags(), si.sh_frame.n
-        away = (si.wi.z < 0) ^ (dr.dot(si.n, si.to_world(si.wi)) < 0) ^ (dr.dot(si.n, n) < 0)
-        is_open = mi.has_flag(flags, mi.BSDFFlags.Transmission) | mi.has_flag(
-            flags, mi.BSDFFlags.Null)
-        shows = is_open | (~away & (mi.has_flag(flags, mi.BSDFFlags.BackSide) | (si.wi.z > 0)))
-        return dr.select(valid & shows, dr.clip(value, 0, 1), 0)
+        return dr.select(valid, dr.clip(value, 0, 1), 0)
 
 
 def _diffuse(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f,

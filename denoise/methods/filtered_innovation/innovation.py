@@ -52,6 +52,8 @@ the last level of other light fades out as the history grows. A pixel of another
 two fifths. In scenes with glossy surfaces light has no rare bright pixels before it: `peaks.py`.
 Visibility is filtered no farther than shadows are soft, and so are its e and Q: `penumbra.py`. The
 last filter of other light is narrower where other surfaces are close: `contact.py`.
+Where neither history nor neighbours can know, a pixel's own rays decide: in slits and hard shadows
+(the same two), and at silhouettes whose normal faces away: `facing_away.py`.
 Normals are not compared: where they differ much the tangent plane is soon left, and at a crease, or
 on a leaf, a neighbour turned away is a better guess than one sample (+0.2 to 0.9 dB for
 normal_power 0 instead of 4 and 128).

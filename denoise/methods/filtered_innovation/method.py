@@ -23,7 +23,6 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.filters.atrous import BACKGROUND, LARGEST_LEVELS
-from onespp.denoise.filters.contact import contact_samples, dark_in_slits
 from onespp.denoise.filters.facing_away import colors_facing_away
 from onespp.denoise.geometry.cameras import pixel_angle
 from onespp.denoise.history.records import RecordState, no_history
@@ -32,8 +31,7 @@ from onespp.denoise.history.reprojection import ReprojectionTests, motion_betwee
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
 from onespp.denoise.inputs.demodulation import read_texture
 from onespp.denoise.inputs.layers import surface_of_gloss
-from onespp.denoise.inputs.repair import repair
-from onespp.denoise.inputs.shadow_rays import ShadowRays, has_shadow_rays, read_shadow_rays, stopped
+from onespp.denoise.inputs.shadow_rays import ShadowRays, has_shadow_rays, read_shadow_rays
 from onespp.denoise.inputs.signals import (
     USED,
     Chosen,
@@ -61,10 +59,10 @@ from .layout import ENERGY_LEVELS, History, SignalLayout
 from .merging import Gains
 from .output import narrowed
 from .passes import Passes
-from .shadows import focal_length
+from .shadows import as_own_rays_say
 from .texture import LEVELS, at_rest_between
 
-_LAMP = 2 * BACKGROUND    # 1/z where albedo is 0: far from any plane, and from background
+_LAMP = 2 * BACKGROUND    # 1/z of what is `alone`: far from any plane, and from background
 LARGE = 640**2            # pixels of an image whose last filter has a level more
 _BACKGROUND_SCALE = 1e3   # of 1/z of background and lamps: only their like counts
 
@@ -79,7 +77,8 @@ class InnovationState(RecordState[Passes]):
 class _Given(NamedTuple):
     """Signals of one surface, and what is known of them.
 
-    away: 1 where the surface reflects nothing and its normal faces away from the camera, else 0.
+    alone: where a surface reflects (almost) nothing, or faces away, and mixes with its like alone.
+    away: 1 where its normal faces away from the camera, else 0.
     roughness, lobe: as of `Signals`, where there is glossy light; its image is the sharper the less
     the former is, its history the longer the more the latter is.
     """
@@ -89,7 +88,7 @@ class _Given(NamedTuple):
     signals: list[Signal]
     chosen: Chosen | None
     surface: Surface
-    zero_albedo: Bool | None
+    alone: Bool | None
     away: Float | None
     lit: Float | None
     rays: ShadowRays | None
@@ -225,29 +224,33 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         if rays is not None and "hit_distance" in frame:
             (hit_distance,) = stencil.load(np.asarray(frame["hit_distance"], np.float32))
         layout, away = self._layout(light, rays is not None, stencil), None
-        if light.texture.zero_albedo is not None:
-            away = dr.select(light.texture.zero_albedo & (surface.plane_distance > 0),
-                             stencil.Float(1), 0)
+        alone = light.texture.zero_albedo
+        if light.unshadowed:  # by Mitsuba, whose silhouettes are so
+            faces_away = surface.is_valid & (surface.plane_distance > 0)
+            away = dr.select(faces_away, stencil.Float(1), 0)
+            alone = faces_away if alone is None else faces_away | alone
 
         def finished(output: list[Signal]) -> Color:
-            image = _dark_in_slits(light.color(output), color, rays, hit_distance, surface)
+            image = light.color(output) if rays is None else as_own_rays_say(
+                stencil, light, output, color, rays, hit_distance,
+                surface.sample._replace(id=stencil.Float(surface.id)))
             return _dark_facing_away(image, frame, away, stencil)
 
         if of_gloss is None or SignalKind.GLOSSY not in layout.kinds:
             output, after = self._filtered(_Given(
-                frame, layout, light.listed, light.chosen, surface, light.texture.zero_albedo,
-                away, light.lit, rays, hit_distance, light.roughness, light.lobe), state)
+                frame, layout, light.listed, light.chosen, surface, alone, away,
+                light.lit, rays, hit_distance, light.roughness, light.lobe), state)
             return finished(output), replace(after, layered=None)
         signals, glossy = list(light.listed), layout.kinds.index(SignalKind.GLOSSY)
-        rest, alone = layout.without_gloss()
+        rest, only_gloss = layout.without_gloss()
         (gloss,), layered = self._filtered(_Given(
-            of_gloss, alone, [signals.pop(glossy)], None, read_surface(of_gloss, stencil),
+            of_gloss, only_gloss, [signals.pop(glossy)], None, read_surface(of_gloss, stencil),
             read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, None, None,
             hit_distance, light.roughness, light.lobe),
             state.layered or InnovationState(stencil, no_history(stencil)))
         output, after = self._filtered(_Given(
-            frame, rest, signals, light.chosen, surface, light.texture.zero_albedo, away, light.lit,
-            rays, hit_distance, None, None), state)
+            frame, rest, signals, light.chosen, surface, alone, away, light.lit, rays,
+            hit_distance, None, None), state)
         output.insert(glossy, gloss)
         return finished(output), replace(after, layered=layered)
 
@@ -258,7 +261,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         stencil, previous, sample = state.stencil, state.previous or frame, surface.sample
         layout, rays = given.layout, given.rays
         motion = motion_between(previous, frame, stencil)
-        plane = self._tangent_plane(frame, surface, given.zero_albedo, stencil)
+        plane = self._tangent_plane(frame, surface, given.alone, stencil)
         passes, records = state.passes, state.records
         if passes is None:
             passes = Passes.make(stencil, layout)
@@ -308,7 +311,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
                             self.sharp_output_levels + wider, has_texture,
                             SignalKind.GLOSSY in light.kinds)  # by whose way lamps are met
 
-    def _tangent_plane(self, frame: Frame, surface: Surface, zero_albedo: Bool | None,
+    def _tangent_plane(self, frame: Frame, surface: Surface, alone: Bool | None,
                        stencil: Stencil) -> TangentPlane:
         """Tangent planes in 1/z. Where there is none (background, lamps) 1/z is far from any other
         and the scale so large that such pixels blend with their like alone."""
@@ -316,9 +319,9 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         inverse_depth = dr.select(is_valid, surface.inverse_depth, stencil.Float(BACKGROUND))
         scale = dr.abs(surface.plane_distance) * stencil.opaque(
             1 / (self.plane_pixels * pixel_angle(frame)))
-        if zero_albedo is not None:
-            inverse_depth = dr.select(is_valid & zero_albedo, _LAMP, inverse_depth)
-            is_valid &= ~zero_albedo
+        if alone is not None:
+            inverse_depth = dr.select(is_valid & alone, _LAMP, inverse_depth)
+            is_valid &= ~alone
         scale = dr.select(is_valid, scale, stencil.Float(_BACKGROUND_SCALE))
         dx, dy = (dr.select(is_valid, slope, 0) for slope in surface.slope)
         return TangentPlane(inverse_depth, dx, dy, scale)
@@ -350,24 +353,12 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
                                          else self.light_sigma, self.visibility_sigma)]
 
 
-def _dark_in_slits(image: Color, color: Color, rays: ShadowRays | None, hit_distance: Float,
-                   surface: Surface) -> Color:
-    """`dark_in_slits`, where a frame tells of its rays; color: of the frame."""
-    if rays is None:
-        return image
-    sample = surface.sample
-    blocked, _ = stopped(rays, type(hit_distance)(sample.id))
-    return dark_in_slits(image, color, contact_samples(
-        blocked, rays.ray.blocker_distance, hit_distance, focal_length(rays) / sample.depth))
-
-
 def _dark_facing_away(image: Color, frame: Frame, away: Float | None, stencil: Stencil) -> Color:
     """`colors_facing_away` in their places; away: 1 there, evaluated."""
     if away is None or not dr.any(away > 0):
         return image
     mask = stencil.rows(away.numpy()) > 0
-    own = colors_facing_away(repair(np.asarray(frame["color"], np.float32), frame["id"]),
-                             frame["id"], mask)
+    own = colors_facing_away(frame["color"], frame["id"], mask)
     rows, columns = np.nonzero(mask)
     lanes = stencil.UInt((rows * stencil.stride + columns).astype(np.uint32))
     image = Color(*[c + 0 for c in image])

@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import drjit as dr
 
-from onespp.denoise.filters.contact import Contact, contact_samples
-from onespp.denoise.filters.penumbra import PenumbraSample, penumbra_samples
+from onespp.denoise.filters.contact import Contact, contact_samples, dark_in_slits
+from onespp.denoise.filters.penumbra import PenumbraSample, left_in_hard_shadow, penumbra_samples
 from onespp.denoise.history.shadow_motion import ShadowMotion, shadow_motion
 from onespp.denoise.inputs.shadow_rays import ShadowRays, stopped
-from onespp.denoise.inputs.signals import Chosen
+from onespp.denoise.inputs.signals import Chosen, Signal, Signals
 from onespp.denoise.inputs.surface import SurfaceSample
-from onespp.denoise.jit.arrays import Float, Vector3
+from onespp.denoise.jit.arrays import Color, Float, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import mapped
 from onespp.denoise.jit.vector import dot, transform
@@ -36,13 +36,17 @@ class Surroundings(NamedTuple):
 def follow_shadows(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
                    position: Vector3) -> Shadows:
     """`shadow_motion` and `penumbra_samples` of each pixel; arguments as of the former."""
+    return Shadows(shadow_motion(stencil, rays, surface, position),
+                   penumbras(stencil, rays, surface))
+
+
+def penumbras(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample) -> PenumbraSample:
+    """`penumbra_samples` of each pixel."""
     blocked, scale = stopped(rays, surface.id)
     light = transform(rays.camera_from_world, rays.ray.light)
     cosine = dr.abs(dot(surface.normal, light)) * scale
-    return Shadows(shadow_motion(stencil, rays, surface, position),
-                   penumbra_samples(stencil, blocked, rays.ray.blocker_distance * scale, cosine,
-                                    rays.ray.light_id, surface.depth, focal_length(rays),
-                                    rays.light_sizes))
+    return penumbra_samples(stencil, blocked, rays.ray.blocker_distance * scale, cosine,
+                            rays.ray.light_id, surface.depth, focal_length(rays), rays.light_sizes)
 
 
 def focal_length(rays: ShadowRays) -> Float:
@@ -69,3 +73,19 @@ def of_each_light(shadows: Shadows, chosen: Chosen | None, groups: int) -> list[
         return [shadows]
     group = chosen.group
     return [mapped(lambda x, g=g: dr.select(group == g, x, 0), shadows) for g in range(groups)]
+
+
+def as_own_rays_say(stencil: Stencil, light: Signals, output: list[Signal], frame: Color,
+                    rays: ShadowRays, hit_distance: Float, surface: SurfaceSample) -> Color:
+    """The colour of filtered signals, but where a pixel's own rays know better than those around:
+    in hard shadows (`penumbra.py`) and in slits (`contact.py`). frame: colour of the frame."""
+    sharpness = penumbras(stencil, rays, surface).inverse_width
+    output, first = list(output), len(output) - len(light.unshadowed)
+    for g in range(len(light.unshadowed)):
+        own = sharpness if light.chosen is None else dr.select(
+            light.chosen.group == g, sharpness, 0)
+        visibility = output[first + g].luminance * left_in_hard_shadow(own)
+        output[first + g] = output[first + g]._replace(luminance=visibility)
+    blocked, _ = stopped(rays, surface.id)
+    return dark_in_slits(light.color(output), frame, contact_samples(
+        blocked, rays.ray.blocker_distance, hit_distance, focal_length(rays) / surface.depth))

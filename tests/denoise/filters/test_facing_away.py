@@ -22,3 +22,11 @@ def test_a_lone_pixel_keeps_the_colour_of_its_frame():
     color, away = np.ones((3, 4, 3)), np.zeros((3, 4), bool)
     away[2, 3], color[2, 3] = True, (0, 0.5, 2)
     np.testing.assert_array_equal(colors_facing_away(color, np.zeros((3, 4)), away), [(0, 0.5, 2)])
+
+
+def test_what_is_not_finite_does_not_count():
+    color, ids, away = np.ones((1, 3, 3)), np.zeros((1, 3)), np.ones((1, 3), bool)
+    color[0, 1, 0] = np.nan
+    np.testing.assert_array_equal(colors_facing_away(color, ids, away), np.ones((3, 3)))
+    color[:] = np.inf
+    np.testing.assert_array_equal(colors_facing_away(color, ids, away), np.zeros((3, 3)))

@@ -137,21 +137,21 @@ def test_of_leaves_it_is_the_formula_in_float64():
     np.testing.assert_allclose(image, expected, rtol=1e-3, atol=5e-5)
 
 
-def test_what_reflects_nothing_and_faces_away_has_the_colour_of_its_frame():
+def test_what_faces_away_has_the_colour_of_its_frame_and_mixes_with_nothing():
     """The formula, and not that of what faces the camera."""
     frames = []
     for i, frame in enumerate(split(19, 26)):
-        rng = np.random.default_rng(i)
-        turned = (rng.random((19, 26, 1)) < 0.5) & (frame["albedo"] == 0).all(-1, keepdims=True)
+        turned = np.random.default_rng(i).random((19, 26, 1)) < 0.1
         frames.append(with_images(
             frame, normal=np.where(turned, -frame["normal"], frame["normal"])))
     away = turned[..., 0] & (frames[-1]["id"] >= 0)
-    assert 5 < away.sum() < 40
+    assert 5 < away.sum() < 60
     method = FilteredInnovation()
     image, _ = run(method, frames)
     expected = innovation_oracle.run(frames, method)
     np.testing.assert_allclose(image, expected, rtol=1e-3, atol=5e-5)
-    assert np.abs(run(method, split(19, 26))[0] - image)[away].max() > 0.1
+    difference = np.abs(run(method, split(19, 26))[0] - image).max(-1)
+    assert np.median(difference[away]) > 0.1
 
 
 def test_pixels_without_unshadowed_light_take_no_visibility_from_their_neighbours():
@@ -160,7 +160,8 @@ def test_pixels_without_unshadowed_light_take_no_visibility_from_their_neighbour
     lit = ((rows + columns) % 2 == 0)[..., None] * frame["unshadowed"]
     full = with_images(frame, unshadowed=lit, direct=lit, visibility=np.ones((12, 16)),
                        indirect=0 * lit, specular=0 * lit, color=frame["emission"] + lit)
-    images = [run(FilteredInnovation(), [with_images(full, visibility=visibility)])[0]
+    method = FilteredInnovation(follow_shadows=False)
+    images = [run(method, [with_images(full, visibility=visibility)])[0]
               for visibility in (full["visibility"], np.where(lit.any(-1), 1, 0))]
     np.testing.assert_array_equal(*images)
     np.testing.assert_allclose(images[1], full["color"], rtol=1e-5, atol=1e-6)

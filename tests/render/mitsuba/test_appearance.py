@@ -10,7 +10,7 @@ from onespp.render.channels import Group, channels_of
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.camera_rays import pixel_rays
 from onespp.render.tracer.renderer import Renderer
-from onespp.scenes.description import Camera, Mesh, Rectangle, Scene, Shape, Sphere
+from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.transforms import look_at, rotate, scale, translate
 
 HEIGHT, WIDTH = 18, 24
@@ -286,28 +286,3 @@ def test_albedo_is_that_of_the_side_that_is_seen():
     sides = {"type": "twosided", "a_front": CHALK, "b_back": conductor(0.1)}
     _, frame, here = seen(sides, place=rotate((0, 1, 0), 180))
     assert (frame["albedo"][here] == 1).all()
-
-
-@pytest.mark.parametrize(("material", "expected"), [
-    (CHALK, 0), (conductor(0.1), 0), (twosided(CHALK), 0.3), (twosided(conductor(0.1)), 1),
-    (glass(), 1), (masked(twosided(CHALK)), 0.15)])
-def test_albedo_is_zero_where_what_has_no_back_is_seen_from_behind(material, expected):
-    renderer, frame, here = seen(material, place=rotate((0, 1, 0), 180))
-    np.testing.assert_allclose(frame["albedo"][here][:, 1], expected, atol=2e-3)
-    assert expected or not renderer.sample_sum(0, 1, 0, 4)[here].any()
-
-
-@pytest.mark.parametrize("both", [False, True])
-def test_albedo_is_zero_where_the_smooth_normal_of_a_face_faces_away(both):
-    """An octahedron with the normals of a ball: at its silhouettes, from where no light comes."""
-    points = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1.0)])
-    faces = [(a, b, c) if (a == 0) ^ (b == 2) ^ (c == 4) else (a, c, b)
-             for a in (0, 1) for b in (2, 3) for c in (4, 5)]
-    ball = Mesh(points, np.array(faces), points)
-    renderer, frame, here = seen(twosided(CHALK) if both else CHALK, ball, scale(1.2))
-    eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
-    away = here & (((eye - frame["position"]) * frame["normal"]).sum(-1) < 0)
-    assert 3 < away.sum() < 0.5 * here.sum()
-    np.testing.assert_array_equal((frame["albedo"] == 0).all(-1)[here], away[here])
-    light = renderer.sample_sum(0, 1, 0, 64)
-    assert light[away].mean() < 0.02 * light[here & ~away].mean()
