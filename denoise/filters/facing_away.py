@@ -1,8 +1,9 @@
 """Pixels at silhouettes of smooth meshes whose shading normal faces away from the camera.
 
-Light would have to come through the mesh to be scattered to the camera there, so such a pixel is
-dark, or black, among bright ones of its own surface, and alone or in a line: neither its plane nor
-where it was before tells how dark. Its result is the mean of the frame's colour over those pixels
+Light would have to come through the mesh to be scattered to the camera there, but by a glossy lobe,
+which goes on along the surface. So where there is a diffuse one such a pixel is dark, or black,
+among bright ones of its own surface, and alone or in a line: neither its plane nor where it was
+before tells how dark. Its result is the mean of the frame's colour over those pixels
 within `RADIUS` that face away too and see the same object. (So it is with Mitsuba; other renderers
 may bend such normals back.)
 
@@ -14,6 +15,9 @@ from __future__ import annotations
 import numpy as np
 
 RADIUS = 3  # pixels
+MOST = 0.05
+"""Share of the pixels from which on normals face away by another rule, as where they point inward:
+then they are taken as if they did not."""
 
 
 def colors_facing_away(color: np.ndarray, ids: np.ndarray, away: np.ndarray) -> np.ndarray:
@@ -23,18 +27,14 @@ def colors_facing_away(color: np.ndarray, ids: np.ndarray, away: np.ndarray) -> 
         color: (h, w, 3), linear; what is not finite does not count. ids: (h, w). away: (h, w)
             bool.
     """
-    rows, columns = np.nonzero(away)
     height, width = away.shape
-    total, count = np.zeros((len(rows), 3)), np.zeros(len(rows))
-    side = range(-RADIUS, RADIUS + 1)
-    for dy in side:
-        for dx in side:
-            y, x = rows + dy, columns + dx
-            inside = (y >= 0) & (y < height) & (x >= 0) & (x < width)
-            y, x = np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)
-            value = color[y, x]
-            alike = (inside & away[y, x] & (ids[y, x] == ids[rows, columns])
-                     & np.isfinite(value).all(-1))
-            total += np.where(alike[:, None], value, 0)
-            count += alike
-    return (total / np.maximum(count, 1)[:, None]).astype(np.float32)
+    y, x = (index[:, None] for index in np.nonzero(away))
+    side = np.arange(2 * RADIUS + 1) - RADIUS
+    rows, columns = y + np.repeat(side, len(side)), x + np.tile(side, len(side))
+    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+    rows, columns = np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
+    value = color[rows, columns].astype(np.float64)
+    alike = inside & away[rows, columns] & (ids[rows, columns] == ids[y, x])
+    alike &= np.isfinite(value).all(-1)
+    total = np.where(alike[..., None], value, 0).sum(1)
+    return (total / np.maximum(alike.sum(1), 1)[:, None]).astype(np.float32)

@@ -127,12 +127,14 @@ def kind_of(frame: Frame) -> np.ndarray:
 
 
 def faces_away(frame: Frame) -> np.ndarray:
-    """Where a surface that Mitsuba lit has a normal that faces away from the camera."""
+    """Where a surface that Mitsuba lit has a normal that faces away from the camera, and is not
+    glossy alone."""
     if "unshadowed" not in frame:
         return np.zeros(frame["id"].shape, bool)
     eye = np.linalg.inv(frame.camera_from_world)[:3, 3]
     cosine = ((eye - frame["position"]) * frame["normal"]).sum(-1)
-    return (frame["id"] >= 0) & (cosine < -1e-3 * frame["depth"])
+    bare = "albedo" in frame and (texture_of(frame) >= 1).all(-1)
+    return (frame["id"] >= 0) & (cosine < -1e-3 * frame["depth"]) & ~bare
 
 
 def geometry(p: Pixels, q: Pixels, dy: int, dx: int, m) -> np.ndarray:

@@ -23,13 +23,13 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.filters.atrous import BACKGROUND, LARGEST_LEVELS
-from onespp.denoise.filters.facing_away import colors_facing_away
+from onespp.denoise.filters.facing_away import MOST, colors_facing_away
 from onespp.denoise.geometry.cameras import pixel_angle
 from onespp.denoise.history.records import RecordState, no_history
 from onespp.denoise.history.reflections import lobes_between
 from onespp.denoise.history.reprojection import ReprojectionTests, motion_between, without_images
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
-from onespp.denoise.inputs.demodulation import read_texture
+from onespp.denoise.inputs.demodulation import Texture, read_texture
 from onespp.denoise.inputs.layers import surface_of_gloss
 from onespp.denoise.inputs.shadow_rays import ShadowRays, has_shadow_rays, read_shadow_rays
 from onespp.denoise.inputs.signals import (
@@ -78,7 +78,6 @@ class _Given(NamedTuple):
     """Signals of one surface, and what is known of them.
 
     alone: where a surface reflects (almost) nothing, or faces away, and mixes with its like alone.
-    away: 1 where its normal faces away from the camera, else 0.
     roughness, lobe: as of `Signals`, where there is glossy light; its image is the sharper the less
     the former is, its history the longer the more the latter is.
     """
@@ -89,7 +88,6 @@ class _Given(NamedTuple):
     chosen: Chosen | None
     surface: Surface
     alone: Bool | None
-    away: Float | None
     lit: Float | None
     rays: ShadowRays | None
     hit_distance: Float
@@ -223,12 +221,12 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         hit_distance = stencil.opaque(0)  # where a frame does not say
         if rays is not None and "hit_distance" in frame:
             (hit_distance,) = stencil.load(np.asarray(frame["hit_distance"], np.float32))
-        layout, away = self._layout(light, rays is not None, stencil), None
-        alone = light.texture.zero_albedo
+        layout = self._layout(light, rays is not None, stencil)
+        alone, away = light.texture.zero_albedo, None
         if light.unshadowed:  # by Mitsuba, whose silhouettes are so
-            faces_away = surface.is_valid & (surface.plane_distance > 0)
-            away = dr.select(faces_away, stencil.Float(1), 0)
-            alone = faces_away if alone is None else faces_away | alone
+            away = _facing_away(surface, light.texture, stencil)
+        if away is not None:
+            alone = away > 0 if alone is None else alone | (away > 0)
 
         def finished(output: list[Signal]) -> Color:
             image = light.color(output) if rays is None else as_own_rays_say(
@@ -238,19 +236,19 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
 
         if of_gloss is None or SignalKind.GLOSSY not in layout.kinds:
             output, after = self._filtered(_Given(
-                frame, layout, light.listed, light.chosen, surface, alone, away,
-                light.lit, rays, hit_distance, light.roughness, light.lobe), state)
+                frame, layout, light.listed, light.chosen, surface, alone, light.lit, rays,
+                hit_distance, light.roughness, light.lobe), state)
             return finished(output), replace(after, layered=None)
         signals, glossy = list(light.listed), layout.kinds.index(SignalKind.GLOSSY)
         rest, only_gloss = layout.without_gloss()
         (gloss,), layered = self._filtered(_Given(
             of_gloss, only_gloss, [signals.pop(glossy)], None, read_surface(of_gloss, stencil),
-            read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, None, None,
-            hit_distance, light.roughness, light.lobe),
+            read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, None, hit_distance,
+            light.roughness, light.lobe),
             state.layered or InnovationState(stencil, no_history(stencil)))
         output, after = self._filtered(_Given(
-            frame, rest, signals, light.chosen, surface, alone, away, light.lit, rays,
-            hit_distance, None, None), state)
+            frame, rest, signals, light.chosen, surface, alone, light.lit, rays, hit_distance,
+            None, None), state)
         output.insert(glossy, gloss)
         return finished(output), replace(after, layered=layered)
 
@@ -277,7 +275,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         if SignalKind.GLOSSY in layout.kinds:
             roughness = stencil.opaque(1) if given.roughness is None else given.roughness
         hit_distance = given.hit_distance
-        evaluate(signals, given.away, given.lit, sample, plane, id_,
+        evaluate(signals, given.lit, sample, plane, id_,
                  (rays, hit_distance, surface.position, roughness) if rays else None, chosen, lobes,
                  narrower)
 
@@ -353,15 +351,27 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
                                          else self.light_sigma, self.visibility_sigma)]
 
 
+def _facing_away(surface: Surface, texture: Texture, stencil: Stencil) -> Float | None:
+    """1 where what has a diffuse lobe has a normal that faces away from the camera, else 0,
+    evaluated; None where none does, or too many do."""
+    there = surface.is_valid & (surface.plane_distance > 0)
+    if texture.albedo is not None:
+        red, green, blue = texture.albedo
+        there &= (red < 1) | (green < 1) | (blue < 1)
+    away = dr.select(there, stencil.Float(1), 0)
+    dr.eval(away)
+    share = float(dr.sum(away)[0]) / stencil.lanes
+    return away if 0 < share < MOST else None
+
+
 def _dark_facing_away(image: Color, frame: Frame, away: Float | None, stencil: Stencil) -> Color:
-    """`colors_facing_away` in their places; away: 1 there, evaluated."""
-    if away is None or not dr.any(away > 0):
+    """`colors_facing_away` in their places; away: of `_facing_away`."""
+    if away is None:
         return image
     mask = stencil.rows(away.numpy()) > 0
     own = colors_facing_away(frame["color"], frame["id"], mask)
     rows, columns = np.nonzero(mask)
     lanes = stencil.UInt((rows * stencil.stride + columns).astype(np.uint32))
-    image = Color(*[c + 0 for c in image])
     dr.eval(image)
     for c, values in zip(image, own.T, strict=True):
         dr.scatter(c, stencil.Float(np.ascontiguousarray(values)), lanes)
