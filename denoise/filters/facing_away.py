@@ -3,9 +3,9 @@
 Light would have to come through the mesh to be scattered to the camera there, but by a glossy lobe,
 which goes on along the surface. So where there is a diffuse one such a pixel is dark, or black,
 among bright ones of its own surface, and alone or in a line: neither its plane nor where it was
-before tells how dark. Its result is the mean of the frame's colour over those pixels
-within `RADIUS` that face away too and see the same object. (So it is with Mitsuba; other renderers
-may bend such normals back.)
+before tells how dark. Its result is the mean of the frame's colour over those pixels within
+`RADIUS` that face away too and see the same object. (So it is with Mitsuba; other renderers may
+bend such normals back.)
 
 NumPy, for few pixels. Our own.
 """
@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 RADIUS = 3  # pixels
-MOST = 0.05
+LARGEST_SHARE = 0.05
 """Share of the pixels from which on normals face away by another rule, as where they point inward:
 then they are taken as if they did not."""
 

@@ -17,7 +17,7 @@ from .grid import Stencil
 
 WORDS = 8  # floats a lane in the table of a window are so many or a multiple: what a gather brings
 
-_while_loop: Any = dr.while_loop  # its type hints know loops of one variable only
+while_loop: Any = dr.while_loop  # its type hints know loops of one variable only
 
 
 def weighted_sums(stencil: Stencil, active: Bool, taps: int, count: int,
@@ -33,7 +33,7 @@ def weighted_sums(stencil: Stencil, active: Bool, taps: int, count: int,
         return i + 1, total + weight, [dr.fma(weight, v, s) for v, s in zip(values, sums)]
 
     zeros = [dr.zeros(stencil.Float, stencil.lanes) for _ in range(count + 1)]
-    _, total, sums = _while_loop(
+    _, total, sums = while_loop(
         (dr.select(active, stencil.Int(0), taps), zeros[0], zeros[1:]),
         lambda i, total, sums: i < taps, body, labels=("tap", "total", "sums"))
     return total, sums

@@ -23,7 +23,7 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.filters.atrous import BACKGROUND, LARGEST_LEVELS
-from onespp.denoise.filters.facing_away import MOST, colors_facing_away
+from onespp.denoise.filters.facing_away import LARGEST_SHARE, colors_facing_away
 from onespp.denoise.geometry.cameras import pixel_angle
 from onespp.denoise.history.records import RecordState, no_history
 from onespp.denoise.history.reflections import lobes_between
@@ -361,7 +361,7 @@ def _facing_away(surface: Surface, texture: Texture, stencil: Stencil) -> Float 
     away = dr.select(there, stencil.Float(1), 0)
     dr.eval(away)
     share = float(dr.sum(away)[0]) / stencil.lanes
-    return away if 0 < share < MOST else None
+    return away if 0 < share < LARGEST_SHARE else None
 
 
 def _dark_facing_away(image: Color, frame: Frame, away: Float | None, stencil: Stencil) -> Color:

@@ -20,10 +20,10 @@ import numpy as np
 
 from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.grid import Planes, Stencil
+from onespp.denoise.jit.masked import while_loop
 from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.taps import Taps
 
-_while_loop: Any = dr.while_loop  # its type hints know loops of one variable only
 _TAPS = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
 
 
@@ -111,7 +111,7 @@ def convolve_by_loop(stencil: Stencil, planes: Float, matrix: Float, bias: Float
         weights = [dr.gather(s.Float, matrix, j * outputs + k) for k in range(outputs)]
         return j + 1, *(dr.fma(w, value, a) for w, a in zip(weights, sums))
 
-    _, *found = _while_loop(
+    _, *found = while_loop(
         (dr.zeros(s.UInt, s.lanes), *(zero + dr.gather(s.Float, bias, s.UInt(k))
                                       for k in range(outputs))),
         lambda j, *_: j < 9 * inputs, add)

@@ -19,9 +19,8 @@ import drjit as dr
 
 from onespp.denoise.jit.arrays import Float, Int, UInt
 from onespp.denoise.jit.grid import Stencil
+from onespp.denoise.jit.masked import while_loop
 from onespp.denoise.jit.structure import evaluate
-
-_while_loop: Any = dr.while_loop  # its type hints know loops of one variable only
 
 
 class Shift(NamedTuple):
@@ -76,7 +75,7 @@ class Blocks:
         def body(i: Any, sums: list[Float]) -> tuple:
             return i + 1, join(sums, [dr.gather(s.Float, row, first + s.UInt(i)) for row in rows])
 
-        _, sums = _while_loop((dr.zeros(s.Int, self.count), _full(s, starts, self.count)),
+        _, sums = while_loop((dr.zeros(s.Int, self.count), _full(s, starts, self.count)),
                               lambda i, sums: i < size, body, labels=("row", "sums"))
         evaluate(sums)
         return sums
@@ -97,7 +96,7 @@ class Blocks:
             at = s.UInt(start + _mirrored(left + i, s.width, size))
             return i + 1, visit(sums, s.unpack(records, at, words, count, lanes))
 
-        _, sums = _while_loop((dr.zeros(s.Int, lanes), _full(s, starts, lanes)),
+        _, sums = while_loop((dr.zeros(s.Int, lanes), _full(s, starts, lanes)),
                               lambda i, sums: i < size, body, labels=("column", "sums"))
         return sums
 

@@ -8,6 +8,7 @@ import drjit as dr
 import numpy as np
 import pytest
 
+from onespp.denoise.filters import penumbra
 from onespp.denoise.filters.penumbra import PenumbraSample, footprint_falloff, footprint_falloffs
 from onespp.denoise.inputs.shadow_rays import light_sizes, read_shadow_rays
 from onespp.denoise.inputs.surface import read_surface
@@ -144,9 +145,10 @@ def test_the_sun_is_as_small_as_it_is_and_the_sky_around_it_is_not():
         assert (q[there] > 0.9).all() == (width == 1)
 
 
-def test_knowing_the_penumbra_lowers_the_error_of_a_first_frame():
+def test_knowing_the_penumbra_lowers_the_error_of_a_first_frame(monkeypatch):
     """Where a board stands on the floor its shadow is sharp, farther away soft; against the same
     frame's direct light with many samples."""
+    monkeypatch.setattr(penumbra, "IN_HARD_SHADOW", 0.0)  # of the filter alone
     scene, size = soft_scene(0.4, standing=True), (96, 128)
     (frame,) = rendered(scene, 1, size)
     renderer = Renderer(scene, *size, direct="resampled")
@@ -157,4 +159,4 @@ def test_knowing_the_penumbra_lowers_the_error_of_a_first_frame():
     floor = frame["id"] == 1
     error = [np.square(run(FilteredInnovation(penumbra=width), [frame])[0] - truth)[floor].mean()
              for width in (1e6, FilteredInnovation().penumbra)]
-    assert error[1] < 0.9 * error[0]
+    assert error[1] < 0.85 * error[0]

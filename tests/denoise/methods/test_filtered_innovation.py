@@ -166,9 +166,9 @@ def test_pixels_without_unshadowed_light_take_no_visibility_from_their_neighbour
     rows, columns = np.mgrid[:12, :16]
     lit = ((rows + columns) % 2 == 0)[..., None] * frame["unshadowed"]
     full = with_images(frame, unshadowed=lit, direct=lit, visibility=np.ones((12, 16)),
-                       indirect=0 * lit, specular=0 * lit, color=frame["emission"] + lit)
-    method = FilteredInnovation(follow_shadows=False)
-    images = [run(method, [with_images(full, visibility=visibility)])[0]
+                       indirect=0 * lit, specular=0 * lit, color=frame["emission"] + lit,
+                       blocker_distance=np.zeros((12, 16)))  # as all is visible
+    images = [run(FilteredInnovation(), [with_images(full, visibility=visibility)])[0]
               for visibility in (full["visibility"], np.where(lit.any(-1), 1, 0))]
     np.testing.assert_array_equal(*images)
     np.testing.assert_allclose(images[1], full["color"], rtol=1e-5, atol=1e-6)
