@@ -33,6 +33,7 @@ class Group(Enum):
 
     RADIANCE = "light by scattering events"
     GUIDES = "what is seen, without noise"
+    PATH = "the path's first segment"
     SPLIT = "direct light as unshadowed light and the share of it that arrives"
     SHADOW = "the shadow ray at the first hit"
     GROUPED = "direct light by groups of lights, of scenes that have several"
@@ -124,6 +125,8 @@ _ROWS = (
     Channel("id", Group.GUIDES, ("ID",), OBJECT_ID, Display.OBJECT, -1.0,
             "object ID: rank of the shape's name in sorted order; images in mirrors and bent glass "
             "have others, see the manifest's `objects`; -1: nothing there"),
+    Channel("hit_distance", Group.PATH, ("hit.Z",), FLOAT, Display.RANGE, 0.0,
+            "from the first hit to what the path met next, scene units; 0: nothing"),
     Channel("unshadowed", Group.SPLIT, _rgb("unshadowed"), FLOAT, Display.LIGHT, 0.0,
             "direct light as if nothing cast a shadow, noise-free (`--direct resampled` only)"),
     Channel("visibility", Group.SPLIT, ("visibility",), FLOAT, Display.UNIT, 0.0,
@@ -150,8 +153,6 @@ _ROWS = (
       for g in range(MOST_GROUPS)),
     Channel("specular", Group.GLOSS, _rgb("specular"), FLOAT, Display.LIGHT, 0.0,
             "part of `indirect` whose first direction a glossy or mirror lobe chose"),
-    Channel("hit_distance", Group.GLOSS, ("hit.Z",), FLOAT, Display.RANGE, 0.0,
-            "from the first hit to what the path met next, scene units; 0: nothing"),
     Channel("hit_id", Group.GLOSS, ("hit.ID",), OBJECT_ID, Display.OBJECT, -1.0,
             "object ID of what the path met next; -1: nothing"),
     Channel("roughness", Group.GLOSS, ("roughness",), HALF, Display.UNIT, 1.0,
@@ -205,7 +206,7 @@ RADIANCE, SPLIT, SHADOW, GROUPED, GLOSS, LAYER, REPLAY = (channels_of(group) for
     Group.RADIANCE, Group.SPLIT, Group.SHADOW, Group.GROUPED, Group.GLOSS, Group.LAYER,
     Group.REPLAY))
 UNSHADOWED = tuple(name for name in GROUPED if name.startswith("unshadowed"))
-FRAME = channels_of(Group.RADIANCE, Group.GUIDES)
+FRAME = channels_of(Group.RADIANCE, Group.GUIDES, Group.PATH)
 """What can be said of every scene."""
 OFFERED = channels_of(*(group for group in Group if group not in (Group.TRUTH, Group.MOTION)))
 """What a rendered frame can carry."""

@@ -6,7 +6,7 @@ ray that was stopped tells d, and so does the first segment of a path, if it met
 the mean over the rays around of 1 / ((2 x)^2 + 1), 0 for one that met nothing, a level of the last
 filter of `innovation.py` weighs a tap, r pixels away, also by
 
-    exp(-k r^2 / (2 p^2)),   diffuse light   k = (c_s + 2 c_h) n / (n + 3)
+    exp(-k r^2 / (2 p^2)),   diffuse light   k = (c_s + 3/2 c_h) n / (n + 3)
                              glossy light    k = c_l n / (n + 3)
 
 of shadow rays and of paths, p as of `penumbra.py`, n the length of the history: the longer it is,
@@ -18,7 +18,11 @@ Slits narrower than a pixel are seen by one frame and missed by the next, so tha
 nor neighbours know how dark it is there; the pixel's own rays do. With c_s and c_h its own, x the
 luminance of the result and y that of the frame, both with emission, the result is
 
-    C (1 - k (1 - min(y / x, 1))),    k = 3/4 sqrt(min(c_s, c_h)).
+    C (1 - k (1 - min(y / x, 1))),    k = max(3/4 sqrt(min(c_s, c_h)), L / (L + 1/20)).
+
+L tells of slits a pixel wide that no light looks into, as between a lamp and the ceiling above it.
+Of c_h, 0 where the frame is not black, it is the least of a pixel and its two neighbours on a line,
+on that of the four lines where this is greatest: one black path is chance, three in line are not.
 
 Source: the idea is that of Mehta et al. 2013, "Axis-aligned filtering for interactive
 physically-based diffuse indirect lighting", where a filter is as wide as the nearest surface is
@@ -33,10 +37,12 @@ import drjit as dr
 
 from onespp.denoise.jit.arrays import Bool, Color, Float
 from onespp.denoise.jit.color import luminance
+from onespp.denoise.jit.taps import Taps
 
-OF_PATHS = 2.0
+OF_PATHS = 1.5
 HALF_LENGTH = 3.0              # frames
-IN_SLIT = 0.75                 # most that a pixel takes of its own frame
+IN_SLIT = 0.75                 # most that a pixel takes of its own frame, by its rays alone
+_LINE = 0.05                   # L of a line that is half taken for a slit
 
 
 class Contact(NamedTuple):
@@ -85,14 +91,28 @@ def contact_falloff(around: Contact, length: Float) -> ContactFalloff:
     return ContactFalloff(diffuse * trust, lobes)
 
 
-def dark_in_slits(image: Color, frame: Color, own: Contact) -> Color:
+def black_contact(frame: Color, of_paths: Float) -> Float:
+    """c_h of each pixel, 0 where the frame is not black."""
+    return dr.select(luminance(frame) > 0, 0, of_paths)
+
+
+def share_of_line(around: Taps[Float]) -> Float:
+    """L / (L + 1/20); around: `black_contact` of the 3x3 pixels, of which the last is the pixel."""
+    taps = [around.at(i) for i in range(len(around))]
+    lines = [dr.minimum(a, b) for a, b in zip(taps[:4], taps[7:3:-1], strict=True)]
+    best = dr.maximum(dr.maximum(lines[0], lines[1]), dr.maximum(lines[2], lines[3]))
+    least = dr.minimum(best, taps[-1])
+    return least / (least + _LINE)
+
+
+def dark_in_slits(image: Color, frame: Color, own: Contact, line: Float) -> Color:
     """The result, darker where the pixel's own rays met something at once.
 
     Args:
-        frame: colour of the frame. own: `contact_samples` of its pixels.
+        frame: colour of the frame. own: `contact_samples` of its pixels. line: `share_of_line`.
     """
     before, seen = luminance(image), luminance(frame)
     ratio = dr.select(before > 0, seen / dr.select(before > 0, before, 1), 1)
-    share = IN_SLIT * dr.sqrt(dr.minimum(own.of_shadows, own.of_paths))
-    left = dr.fma(dr.clip(ratio, 0, 1) - 1, share, 1)
+    alone = IN_SLIT * dr.sqrt(dr.minimum(own.of_shadows, own.of_paths))
+    left = dr.fma(dr.clip(ratio, 0, 1) - 1, dr.maximum(alone, line), 1)
     return Color(*[c * left for c in image])

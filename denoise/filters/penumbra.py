@@ -11,7 +11,8 @@ a light for. A level of `innovation.py` weighs a tap of visibility, r pixels awa
 
     exp(-r^2 q / (2 p^2)),
 
-p a parameter and q the mean of 1 / (w^2 + 1) over the rays around that were stopped. Contact
+p a parameter and q the mean of 1 / (w^2 + 1) over the rays around that were stopped; one of the
+last filter by (1 + (n - 1) / 8) q, n being the samples that the history holds. Contact
 shadows stay sharp, whatever the noise; where nothing is in the light's way, q is 0.
 
 Rays to one of several groups of lights are few, and near a contact those that were stopped may all
@@ -40,6 +41,7 @@ from onespp.denoise.jit.structure import mapped
 from onespp.render.channels import SUN
 
 IN_HARD_SHADOW = 0.75          # most that a stopped ray takes off its pixel's visibility
+_HISTORY = 8.0                 # samples beyond the first that make it twice as narrow
 _OF_ALL = 0.3                  # share of q of all rays that q of a group is at least
 
 
@@ -89,6 +91,11 @@ def footprint_falloffs(around: list[PenumbraSample], scale: Float,
     together = mapped(lambda *of_each: sum(of_each), *around)
     least = _OF_ALL * footprint_falloff(together, scale, min_share)
     return [dr.maximum(falloff, least) for falloff in falloffs]
+
+
+def sharpened(falloff: Float, samples: Float) -> Float:
+    """A `footprint_falloff` as the last filter has it; samples: n."""
+    return falloff * dr.fma(dr.maximum(samples - 1, 0), 1 / _HISTORY, 1)
 
 
 def left_in_hard_shadow(inverse_width: Float) -> Float:

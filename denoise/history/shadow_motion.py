@@ -59,8 +59,9 @@ class ShadowHistory(NamedTuple):
 
 
 def shadow_motion(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
-                  position: Vector3) -> ShadowMotion:
-    """How each pixel's shadow moved; position: X."""
+                  position: Vector3) -> tuple[ShadowMotion, Float]:
+    """How each pixel's shadow moved, and whether there is one that stands still, 1 or 0 (one that
+    is too quick to follow does neither); position: X."""
     light = transform(rays.camera_from_world, rays.ray.light)
     id_, normal, depth = surface
     blocked, scale = stopped(rays, id_)
@@ -92,12 +93,14 @@ def shadow_motion(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
         du = [dr.fma(-(stencil.Float(at) + 0.5), dz, d) * nearness
               for at, d in ((column, dx), (row, dy))]
         length = dr.abs(du[0]) + dr.abs(du[1])
-        moves = ((along < -1) & (length > MIN_MOTION) & (length < MAX_MOTION * stencil.width)
-                 & (nearness > 0))  # false for NaN
-        return dr.select(moves, stencil.Float(1), 0), [dr.select(moves, x, 0) for x in du]
+        known = (along < -1) & (nearness > 0)  # these are false for NaN
+        moves = known & (length > MIN_MOTION) & (length < MAX_MOTION * stencil.width)
+        rests = dr.select(known & (length <= MIN_MOTION), stencil.Float(1), 0)
+        return stencil.Float(1), [dr.select(moves, stencil.Float(1), 0),
+                                  *(dr.select(moves, x, 0) for x in du), rests]
 
-    moves, (dx, dy) = weighted_sums(stencil, blocked, 1, 2, follow)
-    return ShadowMotion(moves, dx, dy)
+    _, (moves, dx, dy, rests) = weighted_sums(stencil, blocked, 1, 4, follow)
+    return ShadowMotion(moves, dx, dy), rests
 
 
 def moved(matrix: list[Float], point: Vector3) -> Vector3:
@@ -118,6 +121,19 @@ def look_up_shadow(stencil: Stencil, surface: SurfaceSample, plane: TangentPlane
     values, is_valid, _ = look_up(stencil, place, records, at + 2, tests.min_cosine, active=moves,
                                   words=words)
     return ShadowHistory(values[at], values[at + 1], moves & is_valid)
+
+
+def shadow_unrest(rests: Float, blocked: Float) -> Float:
+    """From 0, where the shadows around a pixel stand still, to 1, where a quarter of what stops
+    rays does not, or nothing stops any.
+
+    Args:
+        rests: shadows that stand still, of `shadow_motion`. blocked: rays that were stopped. Both
+            are shares of the pixels around.
+    """
+    there = blocked > MIN_SHARE
+    share = rests / dr.select(there, blocked, 1)
+    return dr.select(there, dr.clip(4 * (1 - share), 0, 1), 1)
 
 
 def shadow_place(stencil: Stencil, surface: SurfaceSample, plane: TangentPlane, motion: Motion,

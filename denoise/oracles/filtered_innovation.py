@@ -245,14 +245,18 @@ def spread(frame: Frame, energy: np.ndarray, counts: np.ndarray, levels: int, m,
 
 def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, sigma: np.ndarray,
            fade: np.ndarray, narrow: np.ndarray, m, counts: np.ndarray | None = None,
-           theirs: float = 0.2) -> np.ndarray:
-    """The last filter; its last level's taps are weaker by `fade`, all by exp(-narrow r^2), and a
-    pixel weighs as much as it counts. It compares the first three components, or the only one, by
-    the pixel's variance and a share, `theirs`, of what a neighbour has more."""
+           theirs: float = 0.2, noisy: int = 0) -> np.ndarray:
+    """The last filter; its last level's taps are weaker by `fade`, those of `noisy` levels more by
+    the noise that is left, all by exp(-narrow r^2), and a pixel weighs as much as it counts. It
+    compares the first three components, or the only one, by the pixel's variance and a share,
+    `theirs`, of what a neighbour has more."""
     shape = frame["id"].shape
     counts = np.ones(shape) if counts is None else counts
-    for i in range(levels):
+    for i in range(levels + noisy):
         weaker = fade if i == levels - 1 else np.ones_like(fade)
+        if i >= levels:
+            mean2 = np.maximum(lum(image[..., :3]) ** 2, 1e-12)
+            weaker = np.clip(5 * variance / mean2, 1e-6, 1)
         pixels = pixels_of(frame, m, x=image, v=variance, fade=weaker, narrow=narrow, counts=counts,
                            sigma=sigma)
         total, squares, weights = np.zeros_like(image), np.zeros(shape), np.zeros(shape)
@@ -340,13 +344,19 @@ def of_lit_neighbours(frame: Frame, visibility: np.ndarray, m) -> np.ndarray:
 
 
 def shadow_shift(previous: Frame, frame: Frame, told: np.ndarray | None = None) -> np.ndarray:
-    """(h, w, 2) pixels by which each pixel's shadow was elsewhere; NaN if it was not, or was not
-    told of.
+    """(h, w, 2) pixels by which each pixel's shadow was elsewhere; NaN if it was not, or too far
+    away, or was not told of."""
+    shift = any_shift(previous, frame, told)
+    length = np.abs(shift).sum(-1, keepdims=True)
+    return np.where((length > 0.05) & (length < shift.shape[1] / 4), shift, np.nan)
+
+
+def any_shift(previous: Frame, frame: Frame, told: np.ndarray | None = None) -> np.ndarray:
+    """The same for all shadows that are told of, still ones too.
 
     In world space: the object that the shadow falls on stands still, lights and blockers move.
     """
-    h, w = frame["id"].shape
-    shift = np.full((h, w, 2), np.nan)
+    shift = np.full((*frame["id"].shape, 2), np.nan)
     told = (frame["id"] >= 0) if told is None else told & (frame["id"] >= 0)
 
     def seen(surface: Any, object_: Any, point: np.ndarray) -> np.ndarray:
@@ -367,9 +377,27 @@ def shadow_shift(previous: Frame, frame: Frame, told: np.ndarray | None = None) 
         t = n @ (position - source) / (n @ (blocker - source))
         was = frame.screen_from_world @ [*(source + t * (blocker - source)), 1]
         d = was[:2] / was[3] - [x + 0.5, y + 0.5]
-        if t > 1 and was[3] > 0 and 0.05 < np.abs(d).sum() < w / 4:
+        if t > 1 and was[3] > 0:
             shift[y, x] = d
     return shift
+
+
+def unrest(previous: Frame, frame: Frame, told: np.ndarray, m) -> np.ndarray:
+    """How far shadows or surfaces move on the screen, from 0 where they stand still to 1."""
+    ids = np.maximum(frame["id"], 0)
+    back = np.array([before @ np.linalg.inv(now) for before, now in zip(
+        previous.world_from_object, frame.world_from_object)])[ids]
+    x = np.concatenate([frame["position"].astype(float), np.ones((*ids.shape, 1))], -1)
+    was = np.einsum("ij,hwjk,hwk->hwi", previous.screen_from_world, back, x)
+    column, row = np.meshgrid(np.arange(ids.shape[1]) + 0.5, np.arange(ids.shape[0]) + 0.5)
+    shift = sum(np.abs(was[..., i] / np.where(was[..., 3] > 0, was[..., 3], 1) - at)
+                for i, at in enumerate((column, row)))
+    stopped, _ = sharpness(frame, told)
+    rests = np.abs(any_shift(previous, frame, told)).sum(-1) <= 0.05
+    around = spread_out(frame, 1.0 * np.stack([rests, stopped], -1), m)
+    share = np.where(around[..., 1] > 1e-3, np.clip(
+        4 - 4 * around[..., 0] / np.maximum(around[..., 1], 1e-3), 0, 1), 1)
+    return np.maximum(np.where(shift > 0.05, np.minimum(shift, 1), 0), share)
 
 
 def spread_out(frame: Frame, image: np.ndarray, m) -> np.ndarray:
@@ -452,11 +480,23 @@ def in_slits(frame: Frame, image: np.ndarray, m) -> np.ndarray:
     if "light" not in frame or "hit_distance" not in frame or not m.follow_shadows:
         return image
     seen = frame["id"] >= 0
-    near = np.minimum(met_near(frame, "blocker_distance", seen),
-                      met_near(frame, "hit_distance", seen))
+    of_paths = met_near(frame, "hit_distance", seen)
+    near = np.minimum(met_near(frame, "blocker_distance", seen), of_paths)
     x, y = luminance(image), luminance(frame["color"].astype(float))
     ratio = np.where(x > 0, np.clip(y / np.where(x > 0, x, 1), 0, 1), 1)
-    return image * (1 - 0.75 * np.sqrt(near) * (1 - ratio))[..., None]
+    share = np.maximum(0.75 * np.sqrt(near), of_black_lines(np.where(y > 0, 0, of_paths)))
+    return image * (1 - share * (1 - ratio))[..., None]
+
+
+def of_black_lines(near: np.ndarray) -> np.ndarray:
+    """L / (L + 1/20), L the least of a pixel and two opposite ones, where that is greatest."""
+    (h, w), around, best = near.shape, np.pad(near, 1), np.zeros(near.shape)
+    for dy, dx in ((0, 1), (1, -1), (1, 0), (1, 1)):
+        one, other = (around[1 + s * dy:1 + s * dy + h, 1 + s * dx:1 + s * dx + w]
+                      for s in (-1, 1))
+        best = np.maximum(best, np.minimum(one, other))
+    least = np.minimum(best, near)
+    return least / (least + 0.05)
 
 
 def own_colour_facing_away(frame: Frame, image: np.ndarray) -> np.ndarray:
@@ -483,7 +523,7 @@ def contact(frame: Frame, m, name: str, length: np.ndarray) -> np.ndarray:
         alpha = roughness_of(frame)
         return near("hit_distance", seen & (alpha < 1), alpha) * trust
     of_paths = near("hit_distance", seen) if "hit_distance" in frame else 0
-    return (near("blocker_distance", seen) + 2 * of_paths) * trust
+    return (near("blocker_distance", seen) + 1.5 * of_paths) * trust
 
 
 def without_peaks(frame: Frame, image: np.ndarray, levels: int, m) -> tuple:
@@ -591,6 +631,9 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
                 h = np.where((better & moves)[..., None], there, h)
                 energy = np.maximum(energy + np.minimum(excess[..., 0], 0), 0)
             turn, change = np.zeros(found.shape), wide
+            moving = np.ones(found.shape)
+            if follows and previous is not None:
+                moving = unrest(previous, frame, told, m)
             if name == "G" and "roughness" in frame and previous is not None:
                 turn = np.where(found, turn_of(previous, frame), 0)
             if sparse:
@@ -601,10 +644,10 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
                 key = length_of(frame, name)
                 ns[key] = np.maximum(np.minimum(ns[key], np.where(found, left, 1)), 1)
             parts[name] = (e, h, wide, q, energy, s2, samples, omega, here, lone, change, left,
-                           spatial, narrow, turn)
+                           spatial, narrow, turn, moving)
         for name, d in signals.items():
             (e, h, wide, q, energy, s2, samples, omega, here, lone, change, left, spatial,
-             narrow, turn) = parts[name]
+             narrow, turn, moving) = parts[name]
             alpha, _, levels, sigma, _ = settings.get(name, visible)
             sparse = name.isdigit()
             levels = max(levels - 1, 1) if sparse else levels
@@ -615,7 +658,8 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
             follow = np.maximum(m.glossy_gain, alpha)
             if name != "G":
                 certain = 1 - m.noise_threshold * q / np.maximum(lum(wide) ** 2, 1e-20)
-                follow = np.maximum(certain, m.min_gain if name == "L" else m.sharp_min_gain)
+                follow = np.maximum(certain, m.min_gain if name == "L" else
+                                    m.sharp_min_gain * (0.4 + 0.6 * moving))
                 a = a if name == "L" else np.maximum(a, m.change_alpha * certain)
             if sparse:
                 follow = np.maximum(follow, 1 - known)
@@ -635,6 +679,8 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
             if sparse:
                 s2 = np.where(samples <= 1e-5, 0.25, s2)
             fade = np.clip(1 - ((samples if sparse else n) - 1) / m.fade_frames, 0, 1)
+            if name not in "LG":
+                narrow = narrow * (1 + np.maximum((samples if sparse else n) - 1, 0) / 8)
             sigmas = sigma + np.zeros(found.shape)
             if name == "G" and "roughness" in frame:
                 least = min(m.mirror_sigma / sigma, 1)
@@ -648,7 +694,9 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
             fade = np.ones(found.shape) if name == "G" else fade
             out[name] = guided(frame, before, s2, levels, sigmas, fade, narrow, m,
                                np.clip(samples, 1e-5, 1) if sparse else None,
-                               {"L": 0.2, "G": 1.0}.get(name, 0)) * factor[..., None]
+                               {"L": 0.2, "G": 1.0}.get(name, 0),
+                               int(name == "L" and has_peaks and m.output_levels
+                                   < m.innovation_levels)) * factor[..., None]
             if sparse:
                 history = np.where(samples[..., None] > 1e-5, history, out[name])
             kept[name] = history, s2, np.minimum(samples, 64)

@@ -35,7 +35,7 @@ from .replay import replay
 from .sampler import FRAME_STREAM, REFERENCE_STREAM, Sampler, Sobol, keys_from_seed
 from .view import View
 
-_TRACED = {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS}
+_TRACED = {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS, "hit_distance"}
 """Channels that take more than the first hit."""
 
 

@@ -19,6 +19,9 @@ and a signal takes the share f of it:
     glossy light                                 f = g'',         a = max(1 / n, alpha, t)
     visibility, whose changes have sharp edges   f = max(c, g'),  a = max(1 / n, alpha, r c)
 
+(g' is two fifths of that where neither the shadow, by `shadow_motion.py`, nor the surface moves:
+near a contact S is narrow, and would bring its noise into a shadow that stands still.)
+
     s^2 <- (1 - a)^2 s^2 + a^2 s_0^2,   s_0^2 = max(W[l(e)^2] - s^2, W[l(e)^2] / 4)
 
 with W the first `ENERGY_LEVELS` levels of S: unlike the variance of d in a window, that of e has
@@ -73,8 +76,13 @@ from onespp.denoise.filters.contact import Contact
 from onespp.denoise.filters.penumbra import footprint_falloffs
 from onespp.denoise.history.records import look_up, pack_records, record_words
 from onespp.denoise.history.reflections import Lobes, turned
-from onespp.denoise.history.reprojection import Motion, ReprojectionTests, locate
-from onespp.denoise.history.shadow_motion import MIN_MOTION, MIN_SHARE, look_up_shadow
+from onespp.denoise.history.reprojection import Motion, Place, ReprojectionTests, locate
+from onespp.denoise.history.shadow_motion import (
+    MIN_MOTION,
+    MIN_SHARE,
+    look_up_shadow,
+    shadow_unrest,
+)
 from onespp.denoise.inputs.signals import Chosen, Signal
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
 from onespp.denoise.jit.arrays import Float
@@ -85,7 +93,7 @@ from onespp.denoise.jit.vector import dot
 from .layout import LUMINANCE_PLACE, History, SignalLayout, Smoothed
 from .noise import MAX_ENERGY, spatial_variances
 from .output import FEWEST_SAMPLES
-from .shadows import Surroundings
+from .shadows import Shadows, Surroundings
 from .texture import AtRest, FromHistory, choose, found_at_rest, missed
 
 _TIE = 1e-6                    # excess of a history that is no better nor worse
@@ -121,6 +129,8 @@ class Innovations(NamedTuple):
         shadows: of the other history of each visibility that has one. footprint_falloffs: of
             `penumbra.py`, of each of those. sparse: of each sparse signal. turned: t of
             `reflections.py`, None where the lobes of glossy light are not known.
+        unrest: how much each visibility that shadow rays tell of may have changed by motion, 0
+            where its shadow and its surface stand still on the screen, to 1.
         contact: of `contact.contact_falloff`, None where there are no shadow rays.
         misses: what reprojection may miss of texture, see `texture.py`; at_rest: of that module;
             spatial: of `noise.py`, of such light.
@@ -135,6 +145,7 @@ class Innovations(NamedTuple):
     footprint_falloffs: list[Float]
     sparse: list[SparseHistory]
     turned: Float | None
+    unrest: list[Float]
     misses: Float | None = None
     at_rest: AtRest | None = None
     spatial: Float | None = None
@@ -203,9 +214,19 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
     penumbras = [shadow.penumbra for shadow in shadows]
     return Innovations(e, energies, lengths, variances, valid_inverse_depth, others,
                        footprint_falloffs(penumbras, falloff_scale, MIN_SHARE), sparse,
-                       None if lobes is None else turned(lobes, surface.normal, place), misses,
-                       at_rest, spatial,
+                       None if lobes is None else turned(lobes, surface.normal, place),
+                       _unrest(stencil, shadows, place), misses, at_rest, spatial,
                        mapped(lambda near: falloff_scale * near, around.contact))
+
+
+def _unrest(stencil: Stencil, shadows: list[Shadows], place: Place) -> list[Float]:
+    """Of each visibility; a surface that moves by less than a pixel is between rest and motion."""
+    row, column = stencil.pixel()
+    shift = (dr.abs(place.x - (stencil.Float(column) + 0.5))
+             + dr.abs(place.y - (stencil.Float(row) + 0.5)))
+    shift = dr.select(shift > MIN_MOTION, dr.minimum(shift, 1), 0)
+    return [dr.maximum(shift, shadow_unrest(shadow.rests, shadow.penumbra.blocked))
+            for shadow in shadows]
 
 
 def choose_histories(layout: SignalLayout, innovations: Innovations,

@@ -109,6 +109,8 @@ class SignalLayout:
             has one level less (measured: no worse, and quicker).
         has_texture: the one signal is light whose texture is not known, see `texture.py`.
         has_peaks: rare bright pixels of light are kept from spreading (`filters/peaks.py`).
+        noisy_levels: how many levels more the last filter of diffuse light has where it is noisy
+            still, see `output.noise_left`.
     """
 
     kinds: tuple[SignalKind, ...]
@@ -120,6 +122,7 @@ class SignalLayout:
     sharp_output_levels: int
     has_texture: bool = False
     has_peaks: bool = False
+    noisy_levels: int = 0
 
     def check(self, frame: Frame, now: SignalLayout) -> None:
         """InputError where a frame has other signals than the one before it."""
@@ -191,11 +194,24 @@ class SignalLayout:
 
     def output_level(self, level: int) -> list[int]:
         """The signals that are left at a level of the last filter, the first so many."""
-        return [s for s in range(len(self.kinds)) if level < self._output_levels(s)]
+        return [s for s in range(len(self.kinds))
+                if level < self._output_levels(s) + self._noisy_levels(s)]
+
+    @property
+    def deepest_output(self) -> int:
+        """How many levels the last filter has."""
+        return max(self._output_levels(s) + self._noisy_levels(s) for s in range(len(self.kinds)))
 
     def is_last_level(self, s: int, level: int) -> bool:
-        """Whether the last filter of a signal ends with a level."""
+        """Whether the last filter of a signal ends with a level where it is not noisy."""
         return level == self._output_levels(s) - 1
+
+    def is_noisy_level(self, s: int, level: int) -> bool:
+        """Whether a level is there for what is noisy still."""
+        return level >= self._output_levels(s)
+
+    def _noisy_levels(self, s: int) -> int:
+        return self.noisy_levels if self.kinds[s] is SignalKind.DIFFUSE else 0
 
     def _output_levels(self, s: int) -> int:
         if s == 0:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import drjit as dr
 
 from onespp.denoise.filters.contact import ContactFalloff, contact_falloff
+from onespp.denoise.filters.penumbra import sharpened
 from onespp.denoise.inputs.signals import LARGEST_VISIBILITY, Chosen, Signal, SignalKind
 from onespp.denoise.inputs.surface import TangentPlane
 from onespp.denoise.jit.arrays import Float
@@ -22,6 +23,7 @@ from .noise import NO_SAMPLE, PRIOR_VARIANCE, spatial_variances
 from .output import FEWEST_SAMPLES, fade_out
 from .texture import error_of_history, parts_of, renewal
 
+OF_STILL = 0.4                 # share of g' where shadows stand still
 MIN_NOISE = 0.25               # share of the innovation's energy that is at least noise of d
 _FILLED = 0.5                  # samples that what was filtered counts for
 _UNKNOWN = 0.5                 # visibility that nothing is known of
@@ -53,12 +55,14 @@ class Gains(NamedTuple):
 
 class Merged(NamedTuple):
     """The new history of each signal, its lengths, and `fade_out` of each signal, of sparse ones by
-    their samples; of light with texture, what it was made of; and what `contact.py` asks for."""
+    their samples; `penumbra.sharpened` of each visibility that shadow rays tell of; of light with
+    texture, what it was made of; and what `contact.py` asks for."""
 
     signals: list[NoisySignal]
     lengths: list[Float]
     fades: list[Float]
     sparse_fades: list[Float]
+    footprints: list[Float]
     parts: Pair | None = None
     contact: ContactFalloff | None = None
 
@@ -109,7 +113,10 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
             gain = dr.maximum(certain, gains.min_gain)
         elif kind is SignalKind.VISIBILITY:
             certain = certainty(visible[s], dr.square(wide.luminance), gains.noise_threshold)
-            gain = dr.maximum(certain, gains.sharp_min_gain)
+            least, f = gains.sharp_min_gain, layout.follower(s)
+            if f is not None:
+                least *= dr.fma(1 - OF_STILL, innovations.unrest[f], OF_STILL)
+            gain = dr.maximum(certain, least)
             alpha = dr.maximum(alpha, gains.change_alpha * certain)
         elif turned is not None:  # glossy light
             alpha = dr.maximum(alpha, turned)
@@ -150,7 +157,12 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
     fades = [fade_out(lengths[layout.length(s)], gains.fade_frames) for s in dense]
     parts = parts_of(signals[0], innovations.signals[0]) if layout.has_texture else None
     contact = innovations.contact and contact_falloff(innovations.contact, lengths[0])
-    return Merged(merged, lengths, fades, sparse_fades, parts, contact)
+    footprints = []
+    for s, falloff in enumerate(innovations.footprint_falloffs, len(merged) - layout.followed):
+        samples = merged[s].samples
+        footprints.append(sharpened(
+            falloff, lengths[layout.length(s)] if samples is None else samples))
+    return Merged(merged, lengths, fades, sparse_fades, footprints, parts, contact)
 
 
 def _only_sample(signal: Signal, omega: Float) -> Float:

@@ -59,7 +59,7 @@ from .layout import ENERGY_LEVELS, History, SignalLayout
 from .merging import Gains
 from .output import narrowed
 from .passes import Passes
-from .shadows import as_own_rays_say
+from .shadows import Surroundings, as_own_rays_say
 from .texture import LEVELS, at_rest_between
 
 _LAMP = 2 * BACKGROUND    # 1/z of what is `alone`: far from any plane, and from background
@@ -107,7 +107,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             all of it where frames have albedo and no visibility [1, 1e-6 to 1].
         noise_threshold: a smoothed innovation whose square is below this many of its variances
             is taken for noise [variances, 0 to 1e6].
-        sharp_min_gain: as `min_gain`, of visibility [1, 1e-6 to 1].
+        sharp_min_gain: as `min_gain`, of visibility; less where shadows stand still, see
+            `merging.py` [1, 1e-6 to 1].
         glossy_gain: share of the smoothed innovation that the history of glossy light takes
             [1, 1e-6 to 1].
         change_alpha: weight of the current frame in the high frequencies of visibility where a
@@ -120,7 +121,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         innovation_levels: levels of the innovation's smoothing, of diffuse light [1, 2 to 8].
         output_levels: levels of the last filter of diffuse light while there is no history; the
             last of them fades out over `fade_frames` [1, 1 to 8]. Large images (`LARGE`) have
-            one more, if it is not farther than that of the innovation.
+            one more, and what is noisy still in scenes with glossy surfaces, if it is not farther
+            than that of the innovation.
         sharp_innovation_levels: as `innovation_levels`, of visibility and glossy light, and no
             more than those [1, 2 to 8].
         sharp_output_levels: as `output_levels`, of visibility and glossy light, and no more than
@@ -157,7 +159,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
 
     light_alpha: float = 0.05
     visibility_alpha: float = 0.15
-    min_gain: float = 0.55
+    min_gain: float = 0.45
     noise_threshold: float = 4.0
     sharp_min_gain: float = 0.75
     glossy_gain: float = 0.6
@@ -228,33 +230,35 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         if away is not None:
             alone = away > 0 if alone is None else alone | (away > 0)
 
-        def finished(output: list[Signal]) -> Color:
-            image = light.color(output) if rays is None else as_own_rays_say(
-                stencil, light, output, color, rays, hit_distance,
-                surface.sample._replace(id=stencil.Float(surface.id)))
+        def finished(output: list[Signal], own: Surroundings, passes: Passes | None) -> Color:
+            if own.contact is None or passes is None:
+                image = light.color(output)
+            else:
+                image = as_own_rays_say(light, output, color, own,
+                                        passes.black_lines(color, own.contact))
             return _dark_facing_away(image, frame, away, stencil)
 
         if of_gloss is None or SignalKind.GLOSSY not in layout.kinds:
-            output, after = self._filtered(_Given(
+            output, own, after = self._filtered(_Given(
                 frame, layout, light.listed, light.chosen, surface, alone, light.lit, rays,
                 hit_distance, light.roughness, light.lobe), state)
-            return finished(output), replace(after, layered=None)
+            return finished(output, own, after.passes), replace(after, layered=None)
         signals, glossy = list(light.listed), layout.kinds.index(SignalKind.GLOSSY)
         rest, only_gloss = layout.without_gloss()
-        (gloss,), layered = self._filtered(_Given(
+        (gloss,), _, layered = self._filtered(_Given(
             of_gloss, only_gloss, [signals.pop(glossy)], None, read_surface(of_gloss, stencil),
             read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, None, hit_distance,
             light.roughness, light.lobe),
             state.layered or InnovationState(stencil, no_history(stencil)))
-        output, after = self._filtered(_Given(
+        output, own, after = self._filtered(_Given(
             frame, rest, signals, light.chosen, surface, alone, light.lit, rays, hit_distance,
             None, None), state)
         output.insert(glossy, gloss)
-        return finished(output), replace(after, layered=layered)
+        return finished(output, own, after.passes), replace(after, layered=layered)
 
     def _filtered(self, given: _Given, state: InnovationState,
-                  ) -> tuple[list[Signal], InnovationState]:
-        """Signals that have one surface, filtered."""
+                  ) -> tuple[list[Signal], Surroundings, InnovationState]:
+        """Signals that have one surface, filtered, and what each pixel's own rays met."""
         frame, signals, surface, chosen = given.frame, given.signals, given.surface, given.chosen
         stencil, previous, sample = state.stencil, state.previous or frame, surface.sample
         layout, rays = given.layout, given.rays
@@ -282,8 +286,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         plane = passes.store_surface(id_, plane)
         if given.lit is not None:
             signals = passes.with_visibility_of_unlit(signals, given.lit, plane)
-        around = passes.surroundings(rays, hit_distance, sample, surface.position, plane, chosen,
-                                     roughness)
+        own, around = passes.surroundings(rays, hit_distance, sample, surface.position, plane,
+                                          chosen, roughness)
         innovations = passes.find_innovations(
             signals, chosen, sample, plane, motion, records, around,
             *self._reprojection_parameters(stencil), lobes,
@@ -296,18 +300,19 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
                                       narrower)
         records = passes.pack(sample, History(merged.lengths, merged.signals),
                               output if layout.groups else None)
-        return output, replace(state, passes=passes, records=records,
-                               previous=without_images(frame))
+        return output, own, replace(state, passes=passes, records=records,
+                                    previous=without_images(frame))
 
     def _layout(self, light: Signals, has_shadow_rays: bool, stencil: Stencil) -> SignalLayout:
         has_texture = light.texture.albedo is None and len(light.kinds) == 1
         levels = min(self.innovation_levels, LEVELS) if has_texture else self.innovation_levels
         wider = int(stencil.height * stencil.width > LARGE
                     and self.output_levels < self.innovation_levels)
+        has_peaks = SignalKind.GLOSSY in light.kinds  # by whose way lamps are met
         return SignalLayout(light.kinds, light.groups, has_shadow_rays, levels,
                             min(self.sharp_innovation_levels, levels), self.output_levels + wider,
-                            self.sharp_output_levels + wider, has_texture,
-                            SignalKind.GLOSSY in light.kinds)  # by whose way lamps are met
+                            self.sharp_output_levels + wider, has_texture, has_peaks,
+                            int(has_peaks and self.output_levels + wider < levels))
 
     def _tangent_plane(self, frame: Frame, surface: Surface, alone: Bool | None,
                        stencil: Stencil) -> TangentPlane:

@@ -25,6 +25,7 @@ FEWEST_SAMPLES = 1e-5          # that a sparse signal's pixel counts for where i
 WIDE_LOBE = 0.1                # roughness: such a lobe blurs an image as far as the filter does
 NEIGHBOURS_NOISE = {           # share of a noisier neighbour's variance beyond the pixel's own
     SignalKind.DIFFUSE: 0.2, SignalKind.GLOSSY: 1.0, SignalKind.VISIBILITY: 0.0}
+_NOISY = 5.0                   # times the variance over the square of the mean: all of a level
 _NEVER = -1e3                  # log2 of a weight that is 0
 
 
@@ -52,7 +53,7 @@ def output_level(layout: SignalLayout, level: int, values: Taps[list[NoisySignal
     """
     exponent, h0 = surface_exponent(surfaces, plane, spacing), BINOMIAL[0]**2
     left, center = layout.output_level(level), values.at(-1)
-    rules = [_Rule.of(layout, s, level, falloff, spacing) for s in left]
+    rules = [_Rule.of(layout, s, level, falloff, spacing, c) for s, c in zip(left, center)]
     sums = [_start(c, h0) for c in center]
     if falloff.narrowed is not None:
         sigmas = [sigma * falloff.narrowed if kind is SignalKind.GLOSSY else sigma
@@ -92,9 +93,9 @@ def narrowed(roughness: Float, mirror: Float) -> Float:
 
 
 class _Rule(NamedTuple):
-    """How a signal's taps are weakened: by distance, and at the last level, but for glossy light,
-    whose noise is rare bright pixels that a long history holds too; and the variance that they are
-    judged by.
+    """How a signal's taps are weakened: by distance; at the last level, but for glossy light, whose
+    noise is rare bright pixels that a long history holds too; at a level that is there for what is
+    noisy still; and the variance that they are judged by.
 
     Judged by the pixel's own, a bright pixel, which is noisy, takes from dark ones what they do not
     take from it, and light is lost. So diffuse light counts some of the neighbour's (more would
@@ -113,16 +114,18 @@ class _Rule(NamedTuple):
 
     @staticmethod
     def of(layout: SignalLayout, s: int, level: int, falloff: OutputFalloff,
-           spacing: Float) -> _Rule:
+           spacing: Float, center: NoisySignal) -> _Rule:
         f, g = layout.follower(s), layout.group(s)
         is_glossy = layout.kinds[s] is SignalKind.GLOSSY
         fade = falloff.fades[s] if g is None else falloff.sparse_fades[g]
         near = None if f is None else falloff.footprints[f]
         if falloff.contact is not None and near is None:
             near = falloff.contact.glossy if is_glossy else falloff.contact.diffuse
-        return _Rule(footprint(near, spacing),
-                     fade if layout.is_last_level(s, level) and not is_glossy else None,
-                     NEIGHBOURS_NOISE[layout.kinds[s]])
+        if layout.is_noisy_level(s, level):
+            fade = noise_left(center)
+        elif is_glossy or not layout.is_last_level(s, level):
+            fade = None
+        return _Rule(footprint(near, spacing), fade, NEIGHBOURS_NOISE[layout.kinds[s]])
 
 
 def _start(center: NoisySignal, h0: float) -> NoisySignal:
@@ -142,6 +145,13 @@ def _weighted(w: Float) -> Callable[[Float, Float], Float]:
 
 def _times(factor: Float) -> Callable[[Float], Float]:
     return lambda value: value * factor
+
+
+def noise_left(light: NoisySignal) -> Float:
+    """log2 of 5 s^2 / l^2, at most 0: a tap's weight where so much of the noise is left."""
+    mean2 = dr.square(light.signal.luminance)
+    share = _NOISY * light.variance / dr.maximum(mean2, EPSILON**2)
+    return dr.log2(dr.clip(share, 1e-6, 1))
 
 
 def fade_out(length: Float, frames: Float) -> Float:

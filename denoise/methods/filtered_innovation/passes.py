@@ -8,13 +8,14 @@ from typing import Any, TypeVar
 
 import drjit as dr
 
+from onespp.denoise.filters.contact import Contact, black_contact, share_of_line
 from onespp.denoise.filters.peaks import RADIUS, Energies, with_their_light, without_peaks
 from onespp.denoise.filters.tangent_plane import RING, Roughness, SurfaceTap, loosened, roughness
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
 from onespp.denoise.inputs.shadow_rays import ShadowRays
 from onespp.denoise.inputs.signals import Chosen, Signal, SignalKind
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
-from onespp.denoise.jit.arrays import Float, Vector3
+from onespp.denoise.jit.arrays import Color, Float, Vector3
 from onespp.denoise.jit.grid import Planes, Stencil, single
 from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import arrays_of, build, flatten
@@ -30,7 +31,7 @@ from .texture import CHOICE_RULES, RESIDUAL_RULES, Residual, residual, restored
 
 _OUTSIDE = -1e15          # 1/z outside the image
 _ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH, _ROUGH = range(4)  # planes of the surface
-_SHADOW_PLANES, _CONTACT_PLANES = 5, 2  # of `Shadows` and `Contact`, but lobes
+_SHADOW_PLANES, _CONTACT_PLANES = 6, 2  # of `Shadows` and `Contact`, but lobes
 _AROUND, _WINDOW = [*window(1), (0, 0)], [*window(RADIUS), (0, 0)]
 T = TypeVar("T")
 
@@ -67,7 +68,7 @@ class Passes:
         buffer: planes of what is being smoothed or filtered, see `layout.py`.
         peaks: of luminance and of object ID, of the window of `filters/peaks.py`.
         around: surfaces of the 3x3 pixels around. ring: of shares of roughness.
-        fill: of unlit pixels' visibility.
+        fill: of unlit pixels' visibility. line_taps: of `black_contact`.
     """
 
     stencil: Stencil
@@ -81,6 +82,9 @@ class Passes:
     fill: Level
     look_around: Step[..., Surroundings]
     spread: Level
+    black: Step[..., Float]
+    line: Step[..., Float]
+    line_taps: Taps[Float]
     find_innovations: Step[..., Innovations]
     choice: list[Level]
     choose: Step[..., Innovations]
@@ -140,12 +144,13 @@ class Passes:
                 stencil, rays, hit_distance, chosen, layout.groups, *a)),
             Level.make(SPREAD_LEVEL, buffer, len(spread), surfaces, _INVERSE_DEPTH,
                        lambda *a: smooth_level(spread, *a)),
+            Step(black_contact), Step(share_of_line), buffer.taps(_AROUND, [0]).named(single),
             Step(lambda *a: find_innovations(stencil, layout, *a)),
             choice,
             Step(lambda *a: choose_histories(layout, *a)),
             [smoothing(i) for i in range(layout.innovation_levels)],
             Step(lambda *a: merge(stencil, layout, *a)),
-            [output(i) for i in range(layout.output_levels)],
+            [output(i) for i in range(layout.deepest_output)],
             (buffer.taps(_WINDOW, range(len(layout.with_peaks))),
              surfaces.taps(_WINDOW, [_ID]).named(single)),
             Step(without_peaks),
@@ -177,12 +182,17 @@ class Passes:
 
     def surroundings(self, rays: ShadowRays | None, hit_distance: Float, surface: SurfaceSample,
                      position: Vector3, plane: TangentPlane, chosen: Chosen | None,
-                     roughness: Float | None) -> Surroundings:
+                     roughness: Float | None) -> tuple[Surroundings, Surroundings]:
         """`look_around`, and means of it over a few pixels around."""
         if rays is None:
-            return Surroundings([], None)
-        return self._through([self.spread], self.look_around(rays, hit_distance, chosen, surface,
-                                                             position, roughness), plane)
+            return Surroundings([], None), Surroundings([], None)
+        own = self.look_around(rays, hit_distance, chosen, surface, position, roughness)
+        return own, self._through([self.spread], own, plane)
+
+    def black_lines(self, frame: Color, own: Contact) -> Float:
+        """`share_of_line` of a frame's colour."""
+        self.buffer.store([self.black(frame, own.of_paths)], gutters=True)
+        return self.line(self.line_taps)
 
     def choose_histories(self, innovations: Innovations, plane: TangentPlane) -> Innovations:
         """With the better one of the two histories of each sparse signal, or of light with texture;
@@ -203,7 +213,7 @@ class Passes:
     def filter_output(self, merged: Merged, innovations: Innovations, plane: TangentPlane,
                       sigmas: list[Float], narrower: Float | None) -> list[Signal]:
         """The last filter of each signal; narrower: of `narrowed`."""
-        falloff = OutputFalloff(merged.fades, merged.sparse_fades, innovations.footprint_falloffs,
+        falloff = OutputFalloff(merged.fades, merged.sparse_fades, merged.footprints,
                                 merged.contact, narrower)
         before = [_counted(noisy) for noisy in merged.signals]
         if merged.parts is not None:

@@ -23,6 +23,7 @@ class Shadows(NamedTuple):
     """What shadow rays tell of each pixel, or means over the pixels around."""
 
     motion: ShadowMotion
+    rests: Float
     penumbra: PenumbraSample
 
 
@@ -36,7 +37,7 @@ class Surroundings(NamedTuple):
 def follow_shadows(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
                    position: Vector3) -> Shadows:
     """`shadow_motion` and `penumbra_samples` of each pixel; arguments as of the former."""
-    return Shadows(shadow_motion(stencil, rays, surface, position),
+    return Shadows(*shadow_motion(stencil, rays, surface, position),
                    penumbras(stencil, rays, surface))
 
 
@@ -75,17 +76,17 @@ def of_each_light(shadows: Shadows, chosen: Chosen | None, groups: int) -> list[
     return [mapped(lambda x, g=g: dr.select(group == g, x, 0), shadows) for g in range(groups)]
 
 
-def as_own_rays_say(stencil: Stencil, light: Signals, output: list[Signal], frame: Color,
-                    rays: ShadowRays, hit_distance: Float, surface: SurfaceSample) -> Color:
+def as_own_rays_say(light: Signals, output: list[Signal], frame: Color, own: Surroundings,
+                    line: Float) -> Color:
     """The colour of filtered signals, but where a pixel's own rays know better than those around:
-    in hard shadows (`penumbra.py`) and in slits (`contact.py`). frame: colour of the frame."""
-    sharpness = penumbras(stencil, rays, surface).inverse_width
-    output, first = list(output), len(output) - len(light.unshadowed)
-    for g in range(len(light.unshadowed)):
-        own = sharpness if light.chosen is None else dr.select(
-            light.chosen.group == g, sharpness, 0)
-        visibility = output[first + g].luminance * left_in_hard_shadow(own)
-        output[first + g] = output[first + g]._replace(luminance=visibility)
-    blocked, _ = stopped(rays, surface.id)
-    return dark_in_slits(light.color(output), frame, contact_samples(
-        blocked, rays.ray.blocker_distance, hit_distance, focal_length(rays) / surface.depth))
+    in hard shadows (`penumbra.py`) and in slits (`contact.py`).
+
+    Args:
+        frame: colour of the frame. own: of `look_around`. line: of `share_of_line`.
+    """
+    output, first = list(output), len(output) - len(own.shadows)
+    for s, shadow in enumerate(own.shadows, first):
+        left = left_in_hard_shadow(shadow.penumbra.inverse_width)
+        output[s] = output[s]._replace(luminance=output[s].luminance * left)
+    assert own.contact is not None
+    return dark_in_slits(light.color(output), frame, own.contact, line)

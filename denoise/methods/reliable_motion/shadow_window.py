@@ -39,7 +39,7 @@ class Surroundings(NamedTuple):
 def tabulate_shadows(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample, position: Vector3,
                      direct: LuminanceColor) -> Float:
     """The window's table. Evaluated."""
-    motion = shadow_motion(stencil, rays, surface, position)
+    motion, _ = shadow_motion(stencil, rays, surface, position)
     table = tabulate(stencil, [stencil.Float(surface.id), *motion, *direct])
     evaluate(table)
     return table

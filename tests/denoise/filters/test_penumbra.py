@@ -43,7 +43,7 @@ def sharpness_of(frame):
     """(h, w) whether the ray was stopped, and q."""
     stencil = Stencil(frame.height, frame.width, 1)
     surface, rays = read_surface(frame, stencil), read_shadow_rays(frame, frame, stencil)
-    _, (blocked, q) = follow_shadows(stencil, rays, surface.sample, surface.position)
+    _, _, (blocked, q) = follow_shadows(stencil, rays, surface.sample, surface.position)
     return stencil.image([blocked]) > 0, stencil.image([q])
 
 

@@ -49,7 +49,9 @@ def motion_of(previous, frame):
     """(h, w) whether the kernel says that the shadow moves, and (h, w, 2) by how much."""
     stencil = Stencil(frame.height, frame.width, 1)
     surface, rays = read_surface(frame, stencil), read_shadow_rays(frame, previous, stencil)
-    image = stencil.image(shadow_motion(stencil, rays, surface.sample, surface.position))
+    motion, rests = shadow_motion(stencil, rays, surface.sample, surface.position)
+    image = stencil.image(motion)
+    assert not (stencil.rows(rests.numpy()) * image[..., 0]).any()
     return image[..., 0] > 0, image[..., 1:]
 
 

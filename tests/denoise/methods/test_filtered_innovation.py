@@ -107,18 +107,23 @@ def with_leaves(frame, seed=0):
                        normal=np.where(leaves, normal, frame["normal"]))
 
 
-def split(height, width, count=3, lobes=True, layers=False):
-    """Moving frames with all channels that the method uses, but for those of layers unless asked
-    for, a lamp, and three objects."""
+def split(height, width, count=3, lobes=True, layers=False, still=False):
+    """Moving frames, or still ones, with all channels that the method uses, but for those of
+    layers unless asked for, a lamp, and three objects; moving ones with a part that is black."""
     frames = []
-    for i, frame in enumerate(moving(height, width, count)):
+    for i, frame in enumerate(moving(height, width, 1) * count if still else
+                              moving(height, width, count)):
         rng = np.random.default_rng(100 + i)
         there = frame["id"][..., None] >= 0
         albedo = frame["albedo"].copy()
-        albedo[:height // 3, :width // 4] = 0
+        if not still:
+            albedo[:height // 3, :width // 4] = 0
         unshadowed = np.where(there, albedo * [1.0, 0.8, 0.6] * rng.uniform(0.5, 1, (1, 1, 3)), 0)
         visibility = (rng.random((height, width)) < 0.6) * rng.gamma(4, 0.3, (height, width))
         direct = unshadowed * visibility[..., None] * rng.uniform(0.9, 1.1, (1, 1, 3))
+        if still:  # (noise of its own)
+            frame = with_images(frame, indirect=frame["indirect"] * rng.gamma(
+                4, 0.25, (height, width, 1)))
         specular = 0.3 * frame["indirect"] * rng.random((height, width, 1))
         color = frame["emission"] + direct + frame["indirect"]
         frame = with_images(frame, albedo=albedo, unshadowed=unshadowed, color=color,
@@ -196,6 +201,57 @@ def test_it_is_the_formula_in_float64(height, width, levels, sharp_levels, shado
     image, _ = run(method, frames)
     expected = innovation_oracle.run(frames, method)
     np.testing.assert_allclose(image, expected, rtol=1e-3, atol=5e-5)
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.05])
+def test_it_is_the_formula_where_shadows_stand_still_and_a_slit_is_black(apart):
+    """Still ones, and of some things that move by a part of a pixel; three pixels in a row met
+    something."""
+    frames = split(19, 26, 4, still=True)
+    black = np.zeros((19, 26), bool)
+    black[9, 15:18] = black[4, 20] = True
+    for i, frame in enumerate(frames):
+        dark = np.where(black[..., None], 0, 1)
+        images = {name: dark * frame[name] for name in ("color", "emission", "direct", "indirect",
+                                                        "specular")}
+        blockers = 1 + (np.random.default_rng(i).random((19, 26)) < 0.9)
+        frame = with_images(
+            frame, **images, hit_distance=np.where(black, 0.01, frame["hit_distance"]),
+            blocker_id=np.where(frame["blocker_id"] < 0, -1, blockers))
+        moved = frame.world_from_object.copy()
+        moved[:2, 0, 3] += [0.6 * apart * i, apart * i]
+        frames[i] = replace(frame, world_from_object=moved)
+    method = FilteredInnovation()
+    image, _ = run(method, frames)
+    np.testing.assert_allclose(image, innovation_oracle.run(frames, method), rtol=1e-3, atol=5e-5)
+    around = image[8:11:2, 15:18].mean()
+    assert image[9, 16].mean() < 0.15 * around
+    assert image[4, 20].mean() > 0.2 * image[4, [19, 21]].mean()
+
+
+def test_a_shadow_that_stands_still_gains_by_its_history():
+    """A contact shadow of half-stopped rays, beside the same of a board that is never at rest."""
+    frames = split(32, 40, 10, lobes=False, still=True)
+
+    def shown(i, frame, moves):
+        rng = np.random.default_rng(i)
+        there = frame["id"] >= 0
+        visibility = np.where(rng.random(there.shape) < 0.5, 1.0, 0.0)
+        direct = frame["unshadowed"] * visibility[..., None]
+        board = frame.world_from_object.copy()
+        board[1, 0, 3] += 0.03 * moves * (i % 2)
+        return replace(with_images(
+            frame, visibility=visibility, direct=direct, color=frame["emission"] + direct,
+            indirect=0 * direct, specular=0 * direct, id=np.where(there, 0, -1),
+            blocker_distance=np.where(there & (visibility == 0), 0.2, 0),
+            blocker_id=np.where(there, 1, -1)), world_from_object=board)
+
+    errors = []
+    for moves in (0.0, 1.0):
+        image, _ = run(FilteredInnovation(), [shown(i, f, moves) for i, f in enumerate(frames)])
+        truth = frames[-1]["emission"] + 0.5 * frames[-1]["unshadowed"]
+        errors.append(np.sqrt(np.square(image - truth)[:, 12:26].mean()))
+    assert errors[0] < 0.88 * errors[1]
 
 
 def test_a_signal_follows_by_no_less_than_the_weight_of_the_current_frame():
