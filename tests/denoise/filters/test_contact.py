@@ -61,7 +61,8 @@ def test_a_pixel_is_as_dark_as_its_frame_where_both_of_its_rays_met_something_at
     expected = [0.4 * (1 - 0.75 * 0.75), 0.4 * (1 - 0.9 * 0.75),
                 0.4 * (1 - 0.75 * 0.5**0.5 * 0.75), 0.4, 0, -0.1]
     for found, share in zip(dark, (1, 0.5, 0.2), strict=True):
-        np.testing.assert_allclose(found.numpy(), np.multiply(expected, share), rtol=1e-5, atol=1e-7)
+        np.testing.assert_allclose(found.numpy(), np.multiply(expected, share), rtol=1e-5,
+                                   atol=1e-7)
 
 
 def test_only_a_black_frame_counts_for_a_line():

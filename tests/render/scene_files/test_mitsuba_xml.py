@@ -133,6 +133,24 @@ def test_a_picture_on_a_mesh_shines_as_on_mitsubas_rectangle(
             'type="obj"><string name="filename" value="lamp.obj"/>'))).scene, 4096))
 
 
+def test_a_mesh_without_uv_shines_by_the_barycentric_coordinates_of_its_faces(tmp_path: Path):
+    """As one whose faces all have the same half of the picture (v of an OBJ goes up)."""
+    write_png(tmp_path / "lamp.png", np.random.default_rng(2).random((4, 4, 3)))
+    corners = "".join(f"v {x} {y} 0\n" for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
+    frames = []
+    for name, faces in (("without", "f 1 2 3\nf 1 3 4\n"),
+                        ("with", "vt 0 1\nvt 1 1\nvt 0 0\nf 1/1 2/2 3/3\nf 1/1 3/2 4/3\n")):
+        (tmp_path / f"{name}.obj").write_text(corners + faces)
+        scene = load_xml(written(tmp_path, scene_xml(
+            f'{GROUND}{BALL}<shape type="obj"><string name="filename" value="{name}.obj"/>'
+            '<transform name="to_world"><rotate x="1" angle="90"/><translate y="3"/></transform>'
+            '<emitter type="area"><texture type="bitmap" name="radiance">'
+            '<string name="filename" value="lamp.png"/></texture></emitter></shape>'))).scene
+        frames.append(Renderer(scene, 16, 24).sample_sum(0, 1, 0, 16) / 16)
+    assert frames[0].mean() > 0.005
+    np.testing.assert_allclose(*frames, rtol=1e-3, atol=1e-4)
+
+
 def test_the_light_of_a_point_in_a_tiny_scene_falls_as_in_a_large_one(tmp_path: Path):
     """Tiny scenes are built in units of their own."""
     light = ('<emitter type="point"><point name="position" value="0, 2, 1"/>'
