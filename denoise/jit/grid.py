@@ -9,7 +9,7 @@ A kernel here runs over the *lanes* of a grid: the h rows of an image, each foll
   CPU it is a view of the same memory at another offset: one unaligned vector load, where a gather
   of 16 lanes costs as much as 15 such loads. On CUDA, where neighbouring gathers coalesce, it is a
   gather with an offset that the kernel takes as an argument. The `gather` layout also runs on
-  the CPU, where the tests compare it with the views. It has not been run on a GPU.
+  the CPU, where the tests compare it with the views.
 - A **step** is a traced function that is recorded once and replayed (`dr.freeze`). It takes and
   returns named structures of arrays (`structure.py`).
 
