@@ -6,13 +6,15 @@ ray that was stopped tells d, and so does the first segment of a path, if it met
 the mean over the rays around of 1 / ((2 x)^2 + 1), 0 for one that met nothing, a level of the last
 filter of `innovation.py` weighs a tap, r pixels away, also by
 
-    exp(-k r^2 / (2 p^2)),   diffuse light   k = (c_s + 3/2 c_h) n / (n + 3)
+    exp(-k r^2 / (2 p^2)),   diffuse light   k = (c_s + c_h) n / (n + 3)
                              glossy light    k = c_l n / (n + 3)
 
 of shadow rays and of paths, p as of `penumbra.py`, n the length of the history: the longer it is,
 the less noise is there that would want a wider filter. c_l is as c_h is with alpha x for x, alpha
 being the roughness: a lobe shows what is d away blurred over as many pixels, and sharp what is
-close, as the dark slit between a thing and the glossy floor on which it stands.
+close, as the dark slit between a thing and the glossy floor on which it stands. Not so behind glass
+and among leaves, in scenes that have other layers: what stops a ray there lets light through, by
+few bright paths, and their noise would be worse.
 
 Slits narrower than a pixel are seen by one frame and missed by the next, so that neither history
 nor neighbours know how dark it is there; the pixel's own rays do. With c_s and c_h its own, x the
@@ -39,7 +41,6 @@ from onespp.denoise.jit.arrays import Bool, Color, Float
 from onespp.denoise.jit.color import luminance
 from onespp.denoise.jit.taps import Taps
 
-OF_PATHS = 1.5
 HALF_LENGTH = 3.0              # frames
 IN_SLIT = 0.75                 # most that a pixel takes of its own frame, by its rays alone
 _LINE = 0.05                   # L of a line that is half taken for a slit
@@ -86,7 +87,7 @@ def contact_falloff(around: Contact, length: Float) -> ContactFalloff:
         around: `contact_samples`, smoothed, times log2(e) / (2 p^2). length: n.
     """
     trust = length / (length + HALF_LENGTH)
-    diffuse = dr.fma(OF_PATHS, around.of_paths, around.of_shadows)
+    diffuse = around.of_shadows + around.of_paths
     lobes = None if around.of_lobes is None else around.of_lobes * trust
     return ContactFalloff(diffuse * trust, lobes)
 

@@ -523,7 +523,7 @@ def contact(frame: Frame, m, name: str, length: np.ndarray) -> np.ndarray:
         alpha = roughness_of(frame)
         return near("hit_distance", seen & (alpha < 1), alpha) * trust
     of_paths = near("hit_distance", seen) if "hit_distance" in frame else 0
-    return (near("blocker_distance", seen) + 1.5 * of_paths) * trust
+    return (near("blocker_distance", seen) + of_paths) * trust
 
 
 def without_peaks(frame: Frame, image: np.ndarray, levels: int, m) -> tuple:
@@ -685,7 +685,8 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
             if name == "G" and "roughness" in frame:
                 least = min(m.mirror_sigma / sigma, 1)
                 sigmas = sigma * np.clip(roughness_of(frame) / 0.1, least, 1)
-            if name in "LG" and "light" in frame and m.follow_shadows and len(signals) > 1:
+            if (name in "LG" and "light" in frame and "layer_share" not in frame
+                    and m.follow_shadows and len(signals) > 1):
                 narrow = contact(frame, m, name, ns[length_of(frame, "L")])
             before, factor = history, np.ones(found.shape)
             if name in "LG" and has_peaks:

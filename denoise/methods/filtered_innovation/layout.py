@@ -111,6 +111,7 @@ class SignalLayout:
         has_peaks: rare bright pixels of light are kept from spreading (`filters/peaks.py`).
         noisy_levels: how many levels more the last filter of diffuse light has where it is noisy
             still, see `output.noise_left`.
+        has_layers: glossy light is of other layers, and filtered apart.
     """
 
     kinds: tuple[SignalKind, ...]
@@ -123,6 +124,7 @@ class SignalLayout:
     has_texture: bool = False
     has_peaks: bool = False
     noisy_levels: int = 0
+    has_layers: bool = False
 
     def check(self, frame: Frame, now: SignalLayout) -> None:
         """InputError where a frame has other signals than the one before it."""
@@ -133,8 +135,8 @@ class SignalLayout:
     def without_gloss(self) -> tuple[SignalLayout, SignalLayout]:
         """Of the other signals, and of glossy light alone."""
         rest = tuple(kind for kind in self.kinds if kind is not SignalKind.GLOSSY)
-        return replace(self, kinds=rest), replace(
-            self, kinds=(SignalKind.GLOSSY,), groups=0, has_shadow_rays=False,
+        return replace(self, kinds=rest, has_layers=True), replace(
+            self, kinds=(SignalKind.GLOSSY,), groups=0, has_shadow_rays=False, has_layers=True,
             innovation_levels=self.sharp_innovation_levels, output_levels=self.sharp_output_levels)
 
     def each(self, light: T, visibility: T) -> list[T]:

@@ -42,7 +42,7 @@ def test_light_narrows_with_the_length_of_its_history():
     around = Contact(stencil.Float([0.0, 0.5, 1]), stencil.Float([0, 0, 0.5]))
     lengths = stencil.Float([1, 1, 9])
     falloff = contact_falloff(around, lengths)
-    np.testing.assert_allclose(falloff.diffuse.numpy(), [0, 0.5 / 4, 1.75 * 9 / 12], rtol=1e-6)
+    np.testing.assert_allclose(falloff.diffuse.numpy(), [0, 0.5 / 4, 1.5 * 9 / 12], rtol=1e-6)
     assert falloff.glossy is None
     falloff = contact_falloff(around._replace(of_lobes=stencil.Float([0, 0.5, 1])), lengths)
     assert falloff.glossy is not None
