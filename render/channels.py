@@ -202,8 +202,8 @@ def channels_of(*groups: Group) -> tuple[str, ...]:
     return tuple(row.name for group in groups for row in _ROWS if row.group is group)
 
 
-RADIANCE, SPLIT, SHADOW, GROUPED, GLOSS, LAYER, REPLAY = (channels_of(group) for group in (
-    Group.RADIANCE, Group.SPLIT, Group.SHADOW, Group.GROUPED, Group.GLOSS, Group.LAYER,
+RADIANCE, PATH, SPLIT, SHADOW, GROUPED, GLOSS, LAYER, REPLAY = (channels_of(group) for group in (
+    Group.RADIANCE, Group.PATH, Group.SPLIT, Group.SHADOW, Group.GROUPED, Group.GLOSS, Group.LAYER,
     Group.REPLAY))
 UNSHADOWED = tuple(name for name in GROUPED if name.startswith("unshadowed"))
 FRAME = channels_of(Group.RADIANCE, Group.GUIDES, Group.PATH)

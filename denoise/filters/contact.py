@@ -12,9 +12,9 @@ filter of `innovation.py` weighs a tap, r pixels away, also by
 of shadow rays and of paths, p as of `penumbra.py`, n the length of the history: the longer it is,
 the less noise is there that would want a wider filter. c_l is as c_h is with alpha x for x, alpha
 being the roughness: a lobe shows what is d away blurred over as many pixels, and sharp what is
-close, as the dark slit between a thing and the glossy floor on which it stands. Not so behind glass
-and among leaves, in scenes that have other layers: what stops a ray there lets light through, by
-few bright paths, and their noise would be worse.
+close, as the dark slit between a thing and the glossy floor on which it stands. In scenes that have
+layers, behind glass and among leaves, k is 0: what stops a ray there lets light through, by few
+bright paths, and a narrow filter would leave their noise.
 
 Slits narrower than a pixel are seen by one frame and missed by the next, so that neither history
 nor neighbours know how dark it is there; the pixel's own rays do. With c_s and c_h its own, x the

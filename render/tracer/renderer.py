@@ -14,6 +14,7 @@ from onespp.render.channels import (
     GLOSS,
     GROUPED,
     LAYER,
+    PATH,
     RADIANCE,
     REPLAY,
     SHADOW,
@@ -35,7 +36,7 @@ from .replay import replay
 from .sampler import FRAME_STREAM, REFERENCE_STREAM, Sampler, Sobol, keys_from_seed
 from .view import View
 
-_TRACED = {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS, "hit_distance"}
+_TRACED = {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS, *PATH}
 """Channels that take more than the first hit."""
 
 

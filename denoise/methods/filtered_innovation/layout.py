@@ -109,8 +109,6 @@ class SignalLayout:
             has one level less (measured: no worse, and quicker).
         has_texture: the one signal is light whose texture is not known, see `texture.py`.
         has_peaks: rare bright pixels of light are kept from spreading (`filters/peaks.py`).
-        noisy_levels: how many levels more the last filter of diffuse light has where it is noisy
-            still, see `output.noise_left`.
         has_layers: glossy light is of other layers, and filtered apart.
     """
 
@@ -123,7 +121,6 @@ class SignalLayout:
     sharp_output_levels: int
     has_texture: bool = False
     has_peaks: bool = False
-    noisy_levels: int = 0
     has_layers: bool = False
 
     def check(self, frame: Frame, now: SignalLayout) -> None:
@@ -136,7 +133,7 @@ class SignalLayout:
         """Of the other signals, and of glossy light alone."""
         rest = tuple(kind for kind in self.kinds if kind is not SignalKind.GLOSSY)
         return replace(self, kinds=rest, has_layers=True), replace(
-            self, kinds=(SignalKind.GLOSSY,), groups=0, has_shadow_rays=False, has_layers=True,
+            self, kinds=(SignalKind.GLOSSY,), groups=0, has_shadow_rays=False,
             innovation_levels=self.sharp_innovation_levels, output_levels=self.sharp_output_levels)
 
     def each(self, light: T, visibility: T) -> list[T]:
@@ -213,7 +210,10 @@ class SignalLayout:
         return level >= self._output_levels(s)
 
     def _noisy_levels(self, s: int) -> int:
-        return self.noisy_levels if self.kinds[s] is SignalKind.DIFFUSE else 0
+        """How many levels more there are for what is noisy still, see `output.noise_left`: one for
+        diffuse light with rare bright pixels, if the innovation is smoothed as far."""
+        return int(self.kinds[s] is SignalKind.DIFFUSE and self.has_peaks
+                   and self.output_levels < self.innovation_levels)
 
     def _output_levels(self, s: int) -> int:
         if s == 0:

@@ -156,9 +156,7 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
         merged.append(NoisySignal(merged_signal, variance, samples))
     fades = [fade_out(lengths[layout.length(s)], gains.fade_frames) for s in dense]
     parts = parts_of(signals[0], innovations.signals[0]) if layout.has_texture else None
-    contact = None
-    if innovations.contact is not None and not layout.has_layers:
-        contact = contact_falloff(innovations.contact, lengths[0])
+    contact = innovations.contact and contact_falloff(innovations.contact, lengths[0])
     footprints = []
     for s, falloff in enumerate(innovations.footprint_falloffs, len(merged) - layout.followed):
         samples = merged[s].samples

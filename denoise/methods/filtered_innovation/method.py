@@ -230,19 +230,20 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         if away is not None:
             alone = away > 0 if alone is None else alone | (away > 0)
 
-        def finished(output: list[Signal], own: Surroundings, passes: Passes | None) -> Color:
-            if own.contact is None or passes is None:
+        def finished(output: list[Signal], own: Surroundings, after: InnovationState) -> Color:
+            if own.contact is None:
                 image = light.color(output)
             else:
+                assert after.passes is not None
                 image = as_own_rays_say(light, output, color, own,
-                                        passes.black_lines(color, own.contact))
+                                        after.passes.black_lines(color, own.contact))
             return _dark_facing_away(image, frame, away, stencil)
 
         if of_gloss is None or SignalKind.GLOSSY not in layout.kinds:
             output, own, after = self._filtered(_Given(
                 frame, layout, light.listed, light.chosen, surface, alone, light.lit, rays,
                 hit_distance, light.roughness, light.lobe), state)
-            return finished(output, own, after.passes), replace(after, layered=None)
+            return finished(output, own, after), replace(after, layered=None)
         signals, glossy = list(light.listed), layout.kinds.index(SignalKind.GLOSSY)
         rest, only_gloss = layout.without_gloss()
         (gloss,), _, layered = self._filtered(_Given(
@@ -254,7 +255,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             frame, rest, signals, light.chosen, surface, alone, light.lit, rays, hit_distance,
             None, None), state)
         output.insert(glossy, gloss)
-        return finished(output, own, after.passes), replace(after, layered=layered)
+        return finished(output, own, after), replace(after, layered=layered)
 
     def _filtered(self, given: _Given, state: InnovationState,
                   ) -> tuple[list[Signal], Surroundings, InnovationState]:
@@ -308,11 +309,10 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         levels = min(self.innovation_levels, LEVELS) if has_texture else self.innovation_levels
         wider = int(stencil.height * stencil.width > LARGE
                     and self.output_levels < self.innovation_levels)
-        has_peaks = SignalKind.GLOSSY in light.kinds  # by whose way lamps are met
         return SignalLayout(light.kinds, light.groups, has_shadow_rays, levels,
                             min(self.sharp_innovation_levels, levels), self.output_levels + wider,
-                            self.sharp_output_levels + wider, has_texture, has_peaks,
-                            int(has_peaks and self.output_levels + wider < levels))
+                            self.sharp_output_levels + wider, has_texture,
+                            SignalKind.GLOSSY in light.kinds)  # by whose way lamps are met
 
     def _tangent_plane(self, frame: Frame, surface: Surface, alone: Bool | None,
                        stencil: Stencil) -> TangentPlane:

@@ -104,7 +104,7 @@ class Passes:
     def make(stencil: Stencil, layout: SignalLayout) -> Passes:
         surfaces = stencil.planes([-1.0, _OUTSIDE, _OUTSIDE, 0.0])
         spread = [PlaneRule(SPREAD_LEVEL)] * (_SHADOW_PLANES * (layout.groups or 1)
-                                              + _CONTACT_PLANES
+                                              + _CONTACT_PLANES * (not layout.has_layers)
                                               + layout.kinds.count(SignalKind.GLOSSY))
         buffer = stencil.planes([0.0] * max(len(layout.smoothing_rules), len(spread),
                                             layout.output_planes(layout.output_level(0))))
@@ -183,11 +183,13 @@ class Passes:
     def surroundings(self, rays: ShadowRays | None, hit_distance: Float, surface: SurfaceSample,
                      position: Vector3, plane: TangentPlane, chosen: Chosen | None,
                      roughness: Float | None) -> tuple[Surroundings, Surroundings]:
-        """`look_around`, and means of it over a few pixels around."""
+        """`look_around`, and means of it over a few pixels around; in scenes that have layers no
+        filter asks for those of contacts."""
         if rays is None:
             return Surroundings([], None), Surroundings([], None)
         own = self.look_around(rays, hit_distance, chosen, surface, position, roughness)
-        return own, self._through([self.spread], own, plane)
+        asked = own._replace(contact=None) if self.layout.has_layers else own
+        return own, self._through([self.spread], asked, plane)
 
     def black_lines(self, frame: Color, own: Contact) -> Float:
         """`share_of_line` of a frame's colour."""

@@ -37,17 +37,13 @@ class Surroundings(NamedTuple):
 def follow_shadows(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
                    position: Vector3) -> Shadows:
     """`shadow_motion` and `penumbra_samples` of each pixel; arguments as of the former."""
-    return Shadows(*shadow_motion(stencil, rays, surface, position),
-                   penumbras(stencil, rays, surface))
-
-
-def penumbras(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample) -> PenumbraSample:
-    """`penumbra_samples` of each pixel."""
     blocked, scale = stopped(rays, surface.id)
     light = transform(rays.camera_from_world, rays.ray.light)
     cosine = dr.abs(dot(surface.normal, light)) * scale
-    return penumbra_samples(stencil, blocked, rays.ray.blocker_distance * scale, cosine,
-                            rays.ray.light_id, surface.depth, focal_length(rays), rays.light_sizes)
+    return Shadows(*shadow_motion(stencil, rays, surface, position),
+                   penumbra_samples(stencil, blocked, rays.ray.blocker_distance * scale, cosine,
+                                    rays.ray.light_id, surface.depth, focal_length(rays),
+                                    rays.light_sizes))
 
 
 def focal_length(rays: ShadowRays) -> Float:
