@@ -655,10 +655,13 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
             known = np.minimum(samples, left)
             a = (np.maximum(1 / (known + omega + 0.5 * np.minimum(left, 1)), alpha) if sparse
                  else np.maximum(np.maximum(1 / n, alpha), turn))
-            follow = np.maximum(m.glossy_gain, alpha)
+            follow = np.maximum(m.glossy_gain * (2 + np.minimum(30 * turn, 1)) / 3
+                                if "roughness" in frame else m.glossy_gain, alpha)
             if name != "G":
                 certain = 1 - m.noise_threshold * q / np.maximum(lum(wide) ** 2, 1e-20)
-                follow = np.maximum(certain, m.min_gain if name == "L" else
+                expected = (m.expected_change * lum(h + wide)) ** 2
+                follow = np.maximum(certain, m.min_gain * expected
+                                    / np.maximum(expected + q, 1e-20) if name == "L" else
                                     m.sharp_min_gain * (0.4 + 0.6 * moving))
                 a = a if name == "L" else np.maximum(a, m.change_alpha * certain)
             if sparse:

@@ -50,7 +50,9 @@ def run(frames: list[Frame], m) -> np.ndarray:
         a = np.maximum(np.maximum(1 / n, m.light_alpha), error / (error + np.maximum(noise, 1e-12)))
         n = np.minimum(n, 1 / a)
         certain = 1 - m.noise_threshold * q / np.maximum(lum(wide) ** 2, 1e-20)
-        follow = np.maximum(np.maximum(certain, m.min_gain), a)
+        expected = (m.expected_change * lum(d - e + wide)) ** 2
+        follow = m.min_gain * expected / np.maximum(expected + q, 1e-20)
+        follow = np.maximum(np.maximum(certain, follow), a)
         acc = d - (1 - a)[..., None] * e + (follow - a)[..., None] * wide
         s2 = (1 - a) ** 2 * s2 + a**2 * noise
         out = last_filter(frame, d, d - e, acc, s2, n, found, levels, m)

@@ -15,10 +15,13 @@ and a signal takes the share f of it:
 
     h <- h + f S[e] + a (e - S[e])
 
-    diffuse light, whose changes are slow        f = max(c, g)
+    diffuse light, whose changes are slow        f = max(c, g L / (L + Q)),  L = (b l(h + S[e]))^2
     glossy light                                 f = g'',         a = max(1 / n, alpha, t)
     visibility, whose changes have sharp edges   f = max(c, g'),  a = max(1 / n, alpha, r c)
 
+Light that changes by b of itself, and is seen with the variance Q, is followed best by L / (L + Q)
+(Wiener 1949): where few rays bring much of it, as by way of glass and mirrors, S[e] is mostly noise.
+(g'' is two thirds of that where a mirror direction stands still.)
 (g' is two fifths of that where neither the shadow, by `shadow_motion.py`, nor the surface moves:
 near a contact S is narrow, and would bring its noise into a shadow that stands still.)
 

@@ -16,7 +16,7 @@ from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import mapped
 
-from .change import certainty, coin_variance, lengths_left
+from .change import MIN_ENERGY, certainty, coin_variance, lengths_left
 from .innovation import Innovations, ShadowInnovation, weights_of
 from .layout import NoisySignal, Pair, SignalLayout, Smoothed
 from .noise import NO_SAMPLE, PRIOR_VARIANCE, spatial_variances
@@ -24,6 +24,7 @@ from .output import FEWEST_SAMPLES, fade_out
 from .texture import error_of_history, parts_of, renewal
 
 OF_STILL = 0.4                 # share of g' where shadows stand still
+OF_STILL_IMAGE = 2 / 3         # share of g'' where a mirror direction does
 MIN_NOISE = 0.25               # share of the innovation's energy that is at least noise of d
 _FILLED = 0.5                  # samples that what was filtered counts for
 _UNKNOWN = 0.5                 # visibility that nothing is known of
@@ -31,6 +32,7 @@ _MOST_SAMPLES = 64.0
 LEAST_MEAN = -0.5              # of h + S[e] / S[omega]; lone rays with a small omega say anything
 _LEAST_OMEGA = 0.1             # that a lone sample is divided by
 _OTHER_IMAGE = 0.5             # lobes by which a mirror direction may turn
+_MOVING_IMAGE = 1 / 30         # lobes by which one that does not stand still turns, at least
 _RENEWED = 2.0                 # n below which the noise is estimated anew
 
 
@@ -38,13 +40,15 @@ class Gains(NamedTuple):
     """How history follows.
 
     Attributes:
-        alphas: of each signal. min_gain: g. noise_threshold: k. sharp_min_gain: g'.
+        alphas: of each signal. min_gain: g. expected_change: b. noise_threshold: k.
+        sharp_min_gain: g'.
         glossy_gain: g''. change_alpha: r. fade_frames: until the last filter has faded.
         changes: p of each signal, of `change.py`.
     """
 
     alphas: list[Float]
     min_gain: Float
+    expected_change: Float
     noise_threshold: Float
     sharp_min_gain: Float
     glossy_gain: Float
@@ -110,7 +114,9 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
         if kind is SignalKind.DIFFUSE:
             certain = certainty(smoothed.diffuse_spread, dr.square(wide.luminance),
                                 gains.noise_threshold)
-            gain = dr.maximum(certain, gains.min_gain)
+            low = signal.luminance - e.luminance + wide.luminance
+            gain = dr.maximum(certain, gains.min_gain * expected_gain(
+                dr.square(gains.expected_change * low), smoothed.diffuse_spread))
         elif kind is SignalKind.VISIBILITY:
             certain = certainty(visible[s], dr.square(wide.luminance), gains.noise_threshold)
             least, f = gains.sharp_min_gain, layout.follower(s)
@@ -120,6 +126,8 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
             alpha = dr.maximum(alpha, gains.change_alpha * certain)
         elif turned is not None:  # glossy light
             alpha = dr.maximum(alpha, turned)
+            moves = dr.minimum(turned * (1 / _MOVING_IMAGE), 1)
+            gain *= dr.fma(1 - OF_STILL_IMAGE, moves, OF_STILL_IMAGE)
         if omega is None:
             a = dr.maximum(1 / lengths[layout.length(s)], alpha)
             energy = smoothed.energies[s]
@@ -163,6 +171,11 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
         footprints.append(sharpened(
             falloff, lengths[layout.length(s)] if samples is None else samples))
     return Merged(merged, lengths, fades, sparse_fades, footprints, parts, contact)
+
+
+def expected_gain(change: Float, spread: Float) -> Float:
+    """L / (L + Q); change: L."""
+    return change / dr.maximum(change + spread, MIN_ENERGY)
 
 
 def _only_sample(signal: Signal, omega: Float) -> Float:

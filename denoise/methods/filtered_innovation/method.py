@@ -64,6 +64,7 @@ from .texture import LEVELS, at_rest_between
 
 _LAMP = 2 * BACKGROUND    # 1/z of what is `alone`: far from any plane, and from background
 LARGE = 640**2            # pixels of an image whose last filter has a level more
+_ANY_CHANGE = 1e3         # `expected_change` that takes nothing off a gain
 _BACKGROUND_SCALE = 1e3   # of 1/z of background and lamps: only their like counts
 
 
@@ -103,14 +104,18 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         light_alpha: least weight of the current frame in the high frequencies of diffuse and
             glossy light [1, 1e-6 to 1].
         visibility_alpha: the same of visibility [1, 1e-6 to 1].
-        min_gain: least share of the smoothed innovation that the history of diffuse light takes;
-            all of it where frames have albedo and no visibility [1, 1e-6 to 1].
+        min_gain: least share of the smoothed innovation that the history of diffuse light takes,
+            where that is free of noise; all of it where frames have albedo and no visibility
+            [1, 1e-6 to 1].
+        expected_change: how much diffuse light is expected to change from frame to frame; where
+            the noise of the smoothed innovation is more than that, history takes less of it
+            [share of the light, above 0].
         noise_threshold: a smoothed innovation whose square is below this many of its variances
             is taken for noise [variances, 0 to 1e6].
         sharp_min_gain: as `min_gain`, of visibility; less where shadows stand still, see
             `merging.py` [1, 1e-6 to 1].
-        glossy_gain: share of the smoothed innovation that the history of glossy light takes
-            [1, 1e-6 to 1].
+        glossy_gain: share of the smoothed innovation that the history of glossy light takes;
+            less where mirror directions stand still [1, 1e-6 to 1].
         change_alpha: weight of the current frame in the high frequencies of visibility where a
             change of the low ones is certain [1, 0 to 1].
         light_change: how soon a change forgets the history of diffuse light: the squared change
@@ -159,7 +164,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
 
     light_alpha: float = 0.05
     visibility_alpha: float = 0.15
-    min_gain: float = 0.45
+    min_gain: float = 0.7
+    expected_change: float = 0.1
     noise_threshold: float = 4.0
     sharp_min_gain: float = 0.75
     glossy_gain: float = 0.6
@@ -200,7 +206,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             check_range(self, name, 0.0, 1e6)
         check_range(self, "max_history_length", 1.0, 1e6)
         check_range(self, "min_cosine", -1.0, 1.0)
-        check_positive(self, "light_sigma", "texture_sigma", "visibility_sigma", "mirror_sigma",
+        check_positive(self, "expected_change", "light_sigma", "texture_sigma", "visibility_sigma", "mirror_sigma",
                        "fade_frames", "plane_pixels", "penumbra", "plane_tolerance")
 
     @property
@@ -342,9 +348,9 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
                   SignalKind.VISIBILITY: self.visibility_change}
         # Without visibility apart, diffuse light has the shadows in it, which are quick.
         lags = SignalKind.VISIBILITY in layout.kinds or layout.has_texture
-        min_gain = self.min_gain if lags else 1.0
+        min_gain, expected = (self.min_gain, self.expected_change) if lags else (1.0, _ANY_CHANGE)
         return Gains([stencil.opaque(alpha) for alpha in alphas], stencil.opaque(min_gain),
-                     stencil.opaque(self.noise_threshold), stencil.opaque(self.sharp_min_gain),
+                     stencil.opaque(expected), stencil.opaque(self.noise_threshold), stencil.opaque(self.sharp_min_gain),
                      stencil.opaque(self.glossy_gain), stencil.opaque(self.change_alpha),
                      stencil.opaque(self.fade_frames),
                      [stencil.opaque(change[kind]) for kind in layout.kinds])
