@@ -631,7 +631,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
                 h = np.where((better & moves)[..., None], there, h)
                 energy = np.maximum(energy + np.minimum(excess[..., 0], 0), 0)
             turn, change = np.zeros(found.shape), wide
-            moving = np.ones(found.shape)
+            moving = np.ones(found.shape) if follows else None
             if follows and previous is not None:
                 moving = unrest(previous, frame, told, m)
             if name == "G" and "roughness" in frame and previous is not None:
@@ -639,7 +639,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
             if sparse:
                 norm = norm_of(frame, here, found, smoothing, m, narrow)[..., None]
                 change = np.clip(h + norm * wide, -0.5, 2) - h
-            left = length_left(name, wide, q, energy, change, h, p, m)
+            left = length_left(name, wide, q, energy, change, h, p, m, moving)
             if not sparse:
                 key = length_of(frame, name)
                 ns[key] = np.maximum(np.minimum(ns[key], np.where(found, left, 1)), 1)
@@ -660,9 +660,9 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
             if name != "G":
                 certain = 1 - m.noise_threshold * q / np.maximum(lum(wide) ** 2, 1e-20)
                 expected = (m.expected_change * lum(h + wide)) ** 2
-                follow = np.maximum(certain, m.min_gain * expected
-                                    / np.maximum(expected + q, 1e-20) if name == "L" else
-                                    m.sharp_min_gain * (0.4 + 0.6 * moving))
+                slow = m.min_gain * expected / np.maximum(expected + q, 1e-20)
+                sharp = m.sharp_min_gain * (1 if moving is None else 0.4 + 0.6 * moving)
+                follow = np.maximum(certain, slow if name == "L" else sharp)
                 a = a if name == "L" else np.maximum(a, m.change_alpha * certain)
             if sparse:
                 follow = np.maximum(follow, 1 - known)
@@ -720,19 +720,22 @@ def coin(visibility: np.ndarray) -> np.ndarray:
 
 
 def length_left(name: str, wide: np.ndarray, q: np.ndarray, energy: np.ndarray,
-                change: np.ndarray, h: np.ndarray, p: float, m) -> np.ndarray:
+                change: np.ndarray, h: np.ndarray, p: float, m,
+                moving: np.ndarray | None = None) -> np.ndarray:
     """n, or N, that a change of light leaves at most."""
+    k = m.noise_threshold * (1 if name in "LG" else 0.5 if name.isdigit() or moving is None
+                             else 4 - 3.75 * moving)
     luminance2 = size = lum(wide) ** 2
     if name.isdigit():
-        certain = 1 - m.noise_threshold * q / np.maximum(size, 1e-20)
+        certain = 1 - k * q / np.maximum(size, 1e-20)
         return coin((h + change)[..., 0]) / np.maximum(
             p * (np.maximum(certain, 0) * change[..., 0]) ** 2, 1e-20)
     if name != "V":
         color = np.maximum(wide[..., 0] ** 2, wide[..., 2] ** 2 / 4)
         size = np.maximum(size, color / 4 if name == "L" else color)
     alike = np.minimum(luminance2, energy) / np.maximum(np.maximum(luminance2, energy), 1e-20)
-    q = energy / 24 if name == "G" else q
-    certain = 1 - m.noise_threshold * q * (1 - alike**4) / np.maximum(size, 1e-20)
+    q = energy / 48 if name == "G" else q
+    certain = 1 - k * q * (1 - alike**4) / np.maximum(size, 1e-20)
     size = size * np.maximum(certain, 0) ** 2
     size = np.minimum(size, energy**2 / np.maximum(size, 1e-20))
     noise = np.maximum(energy - size, energy / 16)

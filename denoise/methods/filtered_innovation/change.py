@@ -21,6 +21,10 @@ place's own.
 All of it is of the surroundings: were n of the pixel's own noise, a would go with it, and the mean
 of the history be off (3 % of energy too much with n of h itself).
 
+Of visibility k is half of that. Where shadow rays tell of all of its light it is four times that
+where shadow and surface stand still, for near a contact S is of few rays and has little else to
+tell, and a quarter where they do not.
+
 Of a sparse signal N is v (1 - v), D = max(c, 0)^2 (S[e] / S[omega])^2, and what is limited is the
 sum of omega.
 """
@@ -39,7 +43,9 @@ from .layout import SignalLayout, Smoothed
 MIN_ENERGY = 1e-20             # square of a luminance that is taken for 0
 LEAST_NOISE = 0.01             # variance of a sample of visibility
 _LEAST_SHARE = 1 / 16          # of W that is noise
-_GLOSSY_SAMPLES = 24.0         # W / Q of glossy light, whose Q is not known
+_GLOSSY_SAMPLES = 48.0         # W / Q of glossy light, whose Q is not known
+_OF_VISIBILITY = 0.5           # times k; with shadow rays, if they rest and if they move
+_AT_REST, _IN_MOTION = 4.0, 0.25
 _COLOR = 0.25                  # share of squared red and blue, of diffuse light
 _BLUE = 0.25
 _KEPT = 1e6                    # n where nothing has changed
@@ -60,17 +66,19 @@ def lengths_left(layout: SignalLayout, innovations: Innovations, smoothed: Smoot
     spreads = iter(smoothed.visibility_spread)
     left = []
     for s, (kind, wide, p) in enumerate(zip(layout.kinds, smoothed.each, weights, strict=True)):
-        group = layout.group(s)
+        group, follower, k = layout.group(s), layout.follower(s), threshold
         if kind is SignalKind.VISIBILITY:
             spread = next(spreads)
+            k = threshold * (_OF_VISIBILITY if group is not None or follower is None else dr.fma(
+                innovations.unrest[follower], _IN_MOTION - _AT_REST, _AT_REST))
         elif kind is SignalKind.GLOSSY:
             spread = smoothed.energies[s] / _GLOSSY_SAMPLES
         else:
             spread = smoothed.diffuse_spread
         if group is None:
-            left.append(_left(kind, wide, spread, smoothed.energies[s], threshold, p))
+            left.append(_left(kind, wide, spread, smoothed.energies[s], k, p))
             continue
-        certain = certainty(spread, dr.square(wide.luminance), threshold)
+        certain = certainty(spread, dr.square(wide.luminance), k)
         size = dr.square(dr.maximum(certain, 0) * changes[group])
         noise = coin_variance(innovations.sparse[group].history + changes[group])
         left.append(noise / dr.maximum(p * size, MIN_ENERGY))

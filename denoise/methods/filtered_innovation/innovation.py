@@ -19,11 +19,11 @@ and a signal takes the share f of it:
     glossy light                                 f = g'',         a = max(1 / n, alpha, t)
     visibility, whose changes have sharp edges   f = max(c, g'),  a = max(1 / n, alpha, r c)
 
-Light that changes by b of itself, and is seen with the variance Q, is followed best by L / (L + Q)
-(Wiener 1949): where few rays bring much of it, as by way of glass and mirrors, S[e] is mostly noise.
-(g'' is two thirds of that where a mirror direction stands still.)
-(g' is two fifths of that where neither the shadow, by `shadow_motion.py`, nor the surface moves:
-near a contact S is narrow, and would bring its noise into a shadow that stands still.)
+Light that changes by b of itself, seen with the variance Q, is followed best by L / (L + Q) of
+that (Wiener 1949): where few rays bring much of it, as by way of glass, S[e] is mostly noise. g''
+is two thirds of that where mirror directions stand still; g' two fifths where neither the shadow,
+by `shadow_motion.py`, nor the surface moves: near a contact S is narrow, and would bring its noise
+into a shadow that stands still.
 
     s^2 <- (1 - a)^2 s^2 + a^2 s_0^2,   s_0^2 = max(W[l(e)^2] - s^2, W[l(e)^2] / 4)
 

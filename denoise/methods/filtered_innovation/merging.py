@@ -121,13 +121,13 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
             certain = certainty(visible[s], dr.square(wide.luminance), gains.noise_threshold)
             least, f = gains.sharp_min_gain, layout.follower(s)
             if f is not None:
-                least *= dr.fma(1 - OF_STILL, innovations.unrest[f], OF_STILL)
+                least = least * dr.fma(1 - OF_STILL, innovations.unrest[f], OF_STILL)
             gain = dr.maximum(certain, least)
             alpha = dr.maximum(alpha, gains.change_alpha * certain)
         elif turned is not None:  # glossy light
             alpha = dr.maximum(alpha, turned)
             moves = dr.minimum(turned * (1 / _MOVING_IMAGE), 1)
-            gain *= dr.fma(1 - OF_STILL_IMAGE, moves, OF_STILL_IMAGE)
+            gain = gain * dr.fma(1 - OF_STILL_IMAGE, moves, OF_STILL_IMAGE)
         if omega is None:
             a = dr.maximum(1 / lengths[layout.length(s)], alpha)
             energy = smoothed.energies[s]

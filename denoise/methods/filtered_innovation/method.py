@@ -164,9 +164,9 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
 
     light_alpha: float = 0.05
     visibility_alpha: float = 0.15
-    min_gain: float = 0.7
-    expected_change: float = 0.1
-    noise_threshold: float = 4.0
+    min_gain: float = 0.8
+    expected_change: float = 0.15
+    noise_threshold: float = 8.0
     sharp_min_gain: float = 0.75
     glossy_gain: float = 0.6
     change_alpha: float = 0.6
@@ -206,8 +206,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             check_range(self, name, 0.0, 1e6)
         check_range(self, "max_history_length", 1.0, 1e6)
         check_range(self, "min_cosine", -1.0, 1.0)
-        check_positive(self, "expected_change", "light_sigma", "texture_sigma", "visibility_sigma", "mirror_sigma",
-                       "fade_frames", "plane_pixels", "penumbra", "plane_tolerance")
+        check_positive(self, "expected_change", "light_sigma", "texture_sigma", "visibility_sigma",
+                       "mirror_sigma", "fade_frames", "plane_pixels", "penumbra", "plane_tolerance")
 
     @property
     def reach(self) -> int:
@@ -350,7 +350,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         lags = SignalKind.VISIBILITY in layout.kinds or layout.has_texture
         min_gain, expected = (self.min_gain, self.expected_change) if lags else (1.0, _ANY_CHANGE)
         return Gains([stencil.opaque(alpha) for alpha in alphas], stencil.opaque(min_gain),
-                     stencil.opaque(expected), stencil.opaque(self.noise_threshold), stencil.opaque(self.sharp_min_gain),
+                     stencil.opaque(expected), stencil.opaque(self.noise_threshold),
+                     stencil.opaque(self.sharp_min_gain),
                      stencil.opaque(self.glossy_gain), stencil.opaque(self.change_alpha),
                      stencil.opaque(self.fade_frames),
                      [stencil.opaque(change[kind]) for kind in layout.kinds])

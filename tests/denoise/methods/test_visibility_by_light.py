@@ -43,16 +43,18 @@ def with_groups(frame, visible, seed):
         visibility=np.where(possible > 0, arrived / np.where(possible > 0, possible, 1), 0))
 
 
-def grouped(height, width, count=3, visible=(0.9, 0.3, 0.6), lobes=True):
+def grouped(height, width, count=3, visible=(0.9, 0.3, 0.6), lobes=True, still=False):
     return [with_groups(frame, visible, 50 + i)
-            for i, frame in enumerate(split(height, width, count, lobes))]
+            for i, frame in enumerate(split(height, width, count, lobes, still=still))]
 
 
-@pytest.mark.parametrize(("height", "width", "levels", "sharp_levels", "groups", "shadows"), [
-    (19, 26, 4, 2, 3, True), (19, 26, 4, 3, 4, False), (7, 5, 4, 2, 2, True),
-    (1, 9, 4, 2, 1, True)])
-def test_it_is_the_formula_in_float64(height, width, levels, sharp_levels, groups, shadows):
-    frames = grouped(height, width, 4, (0.9, 0.3, 0.6, 0.2)[:groups])
+@pytest.mark.parametrize(("height", "width", "levels", "sharp_levels", "groups", "shadows",
+                          "still"),
+                         [(19, 26, 4, 2, 3, True, False), (19, 26, 4, 3, 4, False, False),
+                          (7, 5, 4, 2, 2, True, False), (1, 9, 4, 2, 1, True, False),
+                          (17, 27, 4, 2, 3, True, True)])
+def test_it_is_the_formula_in_float64(height, width, levels, sharp_levels, groups, shadows, still):
+    frames = grouped(height, width, 4, (0.9, 0.3, 0.6, 0.2)[:groups], still=still)
     method = FilteredInnovation(
         innovation_levels=levels, output_levels=3, sharp_innovation_levels=sharp_levels,
         sharp_output_levels=2, follow_shadows=shadows)
