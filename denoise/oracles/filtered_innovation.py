@@ -723,8 +723,7 @@ def length_left(name: str, wide: np.ndarray, q: np.ndarray, energy: np.ndarray,
                 change: np.ndarray, h: np.ndarray, p: float, m,
                 moving: np.ndarray | None = None) -> np.ndarray:
     """n, or N, that a change of light leaves at most."""
-    k = m.noise_threshold * (1 if name in "LG" else 0.5 if name.isdigit() or moving is None
-                             else 4 - 3.75 * moving)
+    k = m.noise_threshold * (1 if name in "LG" else 0.5 if moving is None else 4 - 3.5 * moving)
     luminance2 = size = lum(wide) ** 2
     if name.isdigit():
         certain = 1 - k * q / np.maximum(size, 1e-20)

@@ -21,9 +21,8 @@ place's own.
 All of it is of the surroundings: were n of the pixel's own noise, a would go with it, and the mean
 of the history be off (3 % of energy too much with n of h itself).
 
-Of visibility k is half of that. Where shadow rays tell of all of its light it is four times that
-where shadow and surface stand still, for near a contact S is of few rays and has little else to
-tell, and a quarter where they do not.
+Of visibility k is half of that, and four times that where shadow rays tell that shadow and surface
+stand still: near a contact S is of few rays, and has little else to tell there.
 
 Of a sparse signal N is v (1 - v), D = max(c, 0)^2 (S[e] / S[omega])^2, and what is limited is the
 sum of omega.
@@ -44,8 +43,7 @@ MIN_ENERGY = 1e-20             # square of a luminance that is taken for 0
 LEAST_NOISE = 0.01             # variance of a sample of visibility
 _LEAST_SHARE = 1 / 16          # of W that is noise
 _GLOSSY_SAMPLES = 48.0         # W / Q of glossy light, whose Q is not known
-_OF_VISIBILITY = 0.5           # times k; with shadow rays, if they rest and if they move
-_AT_REST, _IN_MOTION = 4.0, 0.25
+_AT_REST, _IN_MOTION = 4.0, 0.5  # times k, of visibility
 _COLOR = 0.25                  # share of squared red and blue, of diffuse light
 _BLUE = 0.25
 _KEPT = 1e6                    # n where nothing has changed
@@ -69,7 +67,7 @@ def lengths_left(layout: SignalLayout, innovations: Innovations, smoothed: Smoot
         group, follower, k = layout.group(s), layout.follower(s), threshold
         if kind is SignalKind.VISIBILITY:
             spread = next(spreads)
-            k = threshold * (_OF_VISIBILITY if group is not None or follower is None else dr.fma(
+            k = threshold * (_IN_MOTION if follower is None else dr.fma(
                 innovations.unrest[follower], _IN_MOTION - _AT_REST, _AT_REST))
         elif kind is SignalKind.GLOSSY:
             spread = smoothed.energies[s] / _GLOSSY_SAMPLES

@@ -382,8 +382,8 @@ def _dark_facing_away(image: Color, frame: Frame, away: Float | None, stencil: S
         return image
     mask = stencil.rows(away.numpy()) > 0
     own = colors_facing_away(frame["color"], frame["id"], mask)
-    rows, columns = np.nonzero(mask)
-    lanes = stencil.UInt((rows * stencil.stride + columns).astype(np.uint32))
+    row, column = np.divmod(np.flatnonzero(mask), stencil.width)
+    lanes = stencil.UInt((row * stencil.stride + column).astype(np.uint32))
     dr.eval(image)
     for c, values in zip(image, own.T, strict=True):
         dr.scatter(c, stencil.Float(np.ascontiguousarray(values)), lanes)
