@@ -81,7 +81,7 @@ def stopped(rays: ShadowRays, id_: Float) -> tuple[Bool, Float]:
     return blocked, dr.rsqrt(dr.select(blocked, length2, 1))
 
 
-_LIGHT_SAMPLES = 2048   # pixels that sizes of lights are estimated from
+_LIGHT_SAMPLES = 2048   # pixels that sizes and motions of lights are estimated from
 _FEWEST_POINTS = 4       # points of a light, or its size is not known
 _FARTHEST = 1e15  # of a point of a light that counts
 
@@ -90,13 +90,11 @@ def light_sizes(frame: Frame) -> np.ndarray:
     """(objects + 2,) float32: twice the standard deviation of the points of each object that shadow
     rays asked for and, at `SUN` and -1, of the environment's sun and of the rest of it. Infinite
     for less than `_FEWEST_POINTS`."""
-    objects = len(frame.world_from_object)
+    objects, some = len(frame.world_from_object), _some(frame)
     count = objects - SUN
-    step = max(1, round((frame.height * frame.width / _LIGHT_SAMPLES) ** 0.5))
-    some = slice(step // 2, None, step)
     depth, light, id_ = (frame[name][some, some] for name in ("depth", "light", "light_id"))
     b = camera_from_screen(frame)
-    y, x = (np.arange(some.start, size, step)[:, None] + 0.5 for size in frame["id"].shape)
+    y, x = (np.arange(some.start, size, some.step)[:, None] + 0.5 for size in frame["id"].shape)
     ray = (y * b[:, 1])[:, None] + x * b[:, 0] + b[:, 2]
     with np.errstate(invalid="ignore", over="ignore"):
         point = depth[..., None] * ray + light @ frame.camera_from_world[:3, :3].T
@@ -111,3 +109,19 @@ def light_sizes(frame: Frame) -> np.ndarray:
     center = np.stack([mean(point[:, c]) for c in range(3)], -1)
     size = 2 * np.sqrt(mean(np.square(point - center[of]).sum(-1)))
     return np.where(number < _FEWEST_POINTS, np.inf, size).astype(np.float32)
+
+
+def share_of_moving_lights(previous: Frame, frame: Frame) -> float:
+    """Share of the shadow rays that went to lights that have moved."""
+    some = _some(frame)
+    id_ = frame["light_id"][some, some][np.abs(frame["light"][some, some]).sum(-1) > 0]
+    motions = world_motions(previous, frame)
+    is_light = (id_ >= 0) & (id_ < len(motions))
+    moved = (motions != np.eye(4)).any((1, 2))[id_[is_light].astype(int)]
+    return float(moved.sum() / max(len(id_), 1))
+
+
+def _some(frame: Frame) -> slice:
+    """Rows, and columns, of the pixels that lights are estimated from."""
+    step = max(1, round((frame.height * frame.width / _LIGHT_SAMPLES) ** 0.5))
+    return slice(step // 2, None, step)

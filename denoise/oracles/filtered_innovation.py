@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -576,7 +577,11 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
     energy = np.zeros(0)
     lengths: dict[str, np.ndarray] = {}  # by what has one, see `length_of`
     previous, out = None, {}
+    own = m
     for frame, signals in zip(frames, given, strict=True):
+        m = own
+        if previous is not None and m.follow_shadows and "light" in frame and len(given[0]) > 1:
+            m = under_moving_lights(previous, frame, own)
         if "V" in signals:
             signals = {**signals, "V": of_lit_neighbours(frame, signals["V"], m)}
         found = np.zeros(frame["id"].shape, bool)
@@ -706,6 +711,20 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
             kept[name] = history, s2, np.minimum(samples, 64)
         lengths, previous = ns, frame
     return out
+
+
+def under_moving_lights(previous: Frame, frame: Frame, m):
+    """The method as it is where so many rays went to lights that have moved."""
+    asked = np.abs(frame["light"]).sum(-1) > 0
+    ids = frame["light_id"]
+    known = asked & (ids >= 0) & (ids < len(frame.world_from_object))
+    moved = [not np.array_equal(*both) for both in zip(previous.world_from_object,
+                                                       frame.world_from_object)]
+    share = min(2 * sum(moved[int(i)] for i in ids[known]) / max(asked.sum(), 1), 1)
+    return replace(
+        m, min_gain=m.min_gain + share * (1 - m.min_gain), noise_threshold=m.noise_threshold
+        * (1 - share / 2), expected_change=m.expected_change / max(1 - share, 1e-4),
+        sharp_min_gain=m.sharp_min_gain + share * max(0.9 - m.sharp_min_gain, 0))
 
 
 def length_of(frame: Frame, name: str) -> str:

@@ -31,7 +31,12 @@ from onespp.denoise.history.reprojection import ReprojectionTests, motion_betwee
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
 from onespp.denoise.inputs.demodulation import Texture, read_texture
 from onespp.denoise.inputs.layers import surface_of_gloss
-from onespp.denoise.inputs.shadow_rays import ShadowRays, has_shadow_rays, read_shadow_rays
+from onespp.denoise.inputs.shadow_rays import (
+    ShadowRays,
+    has_shadow_rays,
+    read_shadow_rays,
+    share_of_moving_lights,
+)
 from onespp.denoise.inputs.signals import (
     USED,
     Chosen,
@@ -64,7 +69,8 @@ from .texture import LEVELS, at_rest_between
 
 _LAMP = 2 * BACKGROUND    # 1/z of what is `alone`: far from any plane, and from background
 LARGE = 640**2            # pixels of an image whose last filter has a level more
-_ANY_CHANGE = 1e3         # `expected_change` that takes nothing off a gain
+_UNDER_MOVING_LIGHTS = 0.9  # `sharp_min_gain`
+_LEAST_SHARE = 1e-4       # that `expected_change` is divided by
 _BACKGROUND_SCALE = 1e3   # of 1/z of background and lamps: only their like counts
 
 
@@ -269,6 +275,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         frame, signals, surface, chosen = given.frame, given.signals, given.surface, given.chosen
         stencil, previous, sample = state.stencil, state.previous or frame, surface.sample
         layout, rays = given.layout, given.rays
+        moving_lights = 0.0 if rays is None else share_of_moving_lights(previous, frame)
         motion = motion_between(previous, frame, stencil)
         plane = self._tangent_plane(frame, surface, given.alone, stencil)
         passes, records = state.passes, state.records
@@ -302,7 +309,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         innovations = passes.choose_histories(innovations, plane)
         smoothed = passes.smooth_innovations(innovations, plane)
         merged = passes.merge(signals, innovations, chosen, smoothed, plane,
-                              self._gains(stencil, layout))
+                              self._gains(stencil, layout, moving_lights))
         output = passes.filter_output(merged, innovations, plane, self._sigmas(stencil, layout),
                                       narrower)
         records = passes.pack(sample, History(merged.lengths, merged.signals),
@@ -342,16 +349,20 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         return (tests, stencil.opaque(self.max_history_length),
                 stencil.opaque(LOG2E / (2 * self.penumbra**2)))
 
-    def _gains(self, stencil: Stencil, layout: SignalLayout) -> Gains:
+    def _gains(self, stencil: Stencil, layout: SignalLayout, moving_lights: float) -> Gains:
         alphas = layout.each(self.light_alpha, self.visibility_alpha)
         change = {SignalKind.DIFFUSE: self.light_change, SignalKind.GLOSSY: self.glossy_change,
                   SignalKind.VISIBILITY: self.visibility_change}
         # Without visibility apart, diffuse light has the shadows in it, which are quick.
-        lags = SignalKind.VISIBILITY in layout.kinds or layout.has_texture
-        min_gain, expected = (self.min_gain, self.expected_change) if lags else (1.0, _ANY_CHANGE)
-        return Gains([stencil.opaque(alpha) for alpha in alphas], stencil.opaque(min_gain),
-                     stencil.opaque(expected), stencil.opaque(self.noise_threshold),
-                     stencil.opaque(self.sharp_min_gain),
+        is_quick = (SignalKind.DIFFUSE in layout.kinds and not layout.has_texture
+                    and SignalKind.VISIBILITY not in layout.kinds)
+        m = 1 if is_quick else min(2 * moving_lights, 1)
+        sharp = self.sharp_min_gain
+        return Gains([stencil.opaque(alpha) for alpha in alphas],
+                     stencil.opaque(self.min_gain + m * (1 - self.min_gain)),
+                     stencil.opaque(self.expected_change / max(1 - m, _LEAST_SHARE)),
+                     stencil.opaque(self.noise_threshold * (1 - m / 2)),
+                     stencil.opaque(sharp + m * max(_UNDER_MOVING_LIGHTS - sharp, 0)),
                      stencil.opaque(self.glossy_gain), stencil.opaque(self.change_alpha),
                      stencil.opaque(self.fade_frames),
                      [stencil.opaque(change[kind]) for kind in layout.kinds])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from onespp.denoise.history.shadow_motion import shadow_motion
-from onespp.denoise.inputs.shadow_rays import read_shadow_rays
+from onespp.denoise.inputs.shadow_rays import read_shadow_rays, share_of_moving_lights
 from onespp.denoise.inputs.surface import read_surface
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
@@ -149,3 +149,17 @@ def test_objects_that_do_not_exist_leave_images_finite(names, value):
         frames = [replace(f, images={**f.images, **{
             name: f[name].astype(dtype) for name in ("blocker_id", "light_id")}}) for f in frames]
         assert np.isfinite(run(FilteredInnovation(), frames)[0]).all()
+
+
+def test_the_share_of_lights_that_move_is_that_of_the_rays_to_them():
+    previous, frame = rendered(shadow_scene(light=1.0, ball=1.0))
+    assert share_of_moving_lights(previous, frame) == 1
+    assert share_of_moving_lights(*rendered(shadow_scene(ball=1.0, camera=0.1))) == 0
+    ids = frame["light_id"].copy()
+    ids[:, ::2] = -1  # to an environment
+    half = replace(frame, images={**frame.images, "light_id": ids})
+    assert share_of_moving_lights(previous, half) == pytest.approx(0.5, abs=0.02)
+    nowhere = replace(frame, images={**frame.images, "light": 0 * frame["light"]})
+    assert share_of_moving_lights(previous, nowhere) == 0
+    broken = replace(frame, images={**frame.images, "light_id": np.full_like(ids, 10**6)})
+    assert share_of_moving_lights(previous, broken) == 0

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from onespp.denoise.methods.filtered_innovation import method as innovation
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
 from onespp.denoise.metrics.errors import psnr
 from onespp.denoise.metrics.tonemap import srgb_from_linear
@@ -67,3 +68,27 @@ def test_the_frame_after_a_change_is_at_most_1_db_behind_single_frames(make):
     assert with_history > alone - 1
     late, _ = decibels(light_change=0, visibility_change=0)
     assert late < alone - 2
+
+
+def test_under_a_lamp_that_moves_history_is_no_worse_than_none(monkeypatch):
+    lamp = _lamp("one", 0.0, (28.0, 26.0, 24.0))
+    still = lamp.world_from_object
+    moving = Shape("one", Rectangle(), _BLACK, Animation(
+        lambda f: translate((-1.4 + 0.4 * f, 0, 0)) @ still), lamp.emission)
+    renderer = Renderer(_scene(moving), HEIGHT, WIDTH, direct="resampled", sampler="zsobol")
+    frames = [renderer.frame(i, channels=renderer.channels) for i in range(7)]
+    truths = [srgb_from_linear(renderer.sample_sum(i, 1, 0, SPP) / SPP) for i in range(1, 7)]
+    method: Any = FilteredInnovation()
+
+    def mean(images):
+        return np.mean([psnr(srgb_from_linear(np.maximum(image, 0)), truth)
+                        for image, truth in zip(images[1:], truths, strict=True)])
+
+    def with_history():
+        return mean(run(method, frames, method.init(HEIGHT, WIDTH)))
+
+    known, alone = with_history(), mean(run_alone(method, frames, method.init(HEIGHT, WIDTH)))
+    monkeypatch.setattr(innovation, "share_of_moving_lights", lambda previous, frame: 0.0)
+    unknown = with_history()
+    assert known > alone - 0.1
+    assert known > unknown + 0.1
