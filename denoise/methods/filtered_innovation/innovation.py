@@ -23,9 +23,9 @@ Light that changes by b of itself, seen with the variance Q, is followed best by
 that (Wiener 1949): where few rays bring much of it, as by way of glass, S[e] is mostly noise. g''
 is two thirds of that where mirror directions stand still; g' two fifths where neither the shadow,
 by `shadow_motion.py`, nor the surface moves: near a contact S is narrow, and would bring its noise
-into a shadow that stands still. Where lights move, light changes everywhere: with m twice the share
-of shadow rays that went to such, at most 1, g becomes g + m (1 - g), b / (1 - m), k (1 - m / 2), and
-g' grows to 9/10.
+into a shadow that stands still. Where lights move, light changes everywhere: with m twice the
+share of shadow rays that went to such, at most 1, g becomes g + m (1 - g), b / (1 - m) and
+k (1 - m / 2), and g' grows to 9/10.
 
     s^2 <- (1 - a)^2 s^2 + a^2 s_0^2,   s_0^2 = max(W[l(e)^2] - s^2, W[l(e)^2] / 4)
 
