@@ -19,7 +19,7 @@ from onespp.denoise.jit.structure import mapped
 from .change import MIN_ENERGY, certainty, coin_variance, lengths_left
 from .innovation import Innovations, ShadowInnovation, weights_of
 from .layout import NoisySignal, Pair, SignalLayout, Smoothed
-from .noise import NO_SAMPLE, PRIOR_VARIANCE, spatial_variances
+from .noise import MAX_ENERGY, NO_SAMPLE, PRIOR_VARIANCE, spatial_variances
 from .output import FEWEST_SAMPLES, fade_out
 from .texture import error_of_history, parts_of, renewal
 
@@ -114,9 +114,9 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
         if kind is SignalKind.DIFFUSE:
             certain = certainty(smoothed.diffuse_spread, dr.square(wide.luminance),
                                 gains.noise_threshold)
-            low = signal.luminance - e.luminance + wide.luminance
+            change = gains.expected_change * (signal.luminance - e.luminance + wide.luminance)
             gain = dr.maximum(certain, gains.min_gain * expected_gain(
-                dr.square(gains.expected_change * low), smoothed.diffuse_spread))
+                dr.minimum(dr.square(change), MAX_ENERGY), smoothed.diffuse_spread))
         elif kind is SignalKind.VISIBILITY:
             certain = certainty(visible[s], dr.square(wide.luminance), gains.noise_threshold)
             least, f = gains.sharp_min_gain, layout.follower(s)

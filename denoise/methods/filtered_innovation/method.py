@@ -111,13 +111,13 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             glossy light [1, 1e-6 to 1].
         visibility_alpha: the same of visibility [1, 1e-6 to 1].
         min_gain: least share of the smoothed innovation that the history of diffuse light takes,
-            where that is free of noise; all of it where frames have albedo and no visibility
-            [1, 1e-6 to 1].
+            where that is free of noise; all of it where lights move, and where frames have albedo
+            and no visibility [1, 1e-6 to 1].
         expected_change: how much diffuse light is expected to change from frame to frame; where
             the noise of the smoothed innovation is more than that, history takes less of it
             [share of the light, above 0].
         noise_threshold: a smoothed innovation whose square is below this many of its variances
-            is taken for noise [variances, 0 to 1e6].
+            is taken for noise; fewer where lights move [variances, 0 to 1e6].
         sharp_min_gain: as `min_gain`, of visibility; less where shadows stand still, see
             `merging.py` [1, 1e-6 to 1].
         glossy_gain: share of the smoothed innovation that the history of glossy light takes;
