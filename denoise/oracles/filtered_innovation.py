@@ -530,11 +530,11 @@ def contact(frame: Frame, m, name: str, length: np.ndarray) -> np.ndarray:
 def without_peaks(frame: Frame, image: np.ndarray, levels: int, m) -> tuple:
     """Light without what is above 2.5 times the mean of the same object around, and the factor that
     gives it back."""
-    x = np.maximum(lum(image), 0)
+    x, shape = np.maximum(lum(image), 0), frame["id"].shape
     pixels = pixels_of(frame, m, x=x)
-    count, total = np.zeros(x.shape), np.zeros(x.shape)
+    count, total = np.zeros(shape), np.zeros(shape)
     for dy, dx in np.ndindex(5, 5):
-        where, p, q = pairs(pixels, x.shape, dy - 2, dx - 2)
+        where, p, q = pairs(pixels, shape, dy - 2, dx - 2)
         if where is None or (dy, dx) == (2, 2):
             continue
         same = (p.id == q.id) & (p.id >= 0)

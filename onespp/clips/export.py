@@ -105,7 +105,7 @@ def noisebase(data: DataSet, out: Path, progress: Progress = silent) -> int:
 
 def _zarr(layout: str) -> Any:
     try:
-        import zarr as library
+        import zarr as library  # pyright: ignore[reportMissingImports]  # not for Python 3.10
     except ImportError:
         raise InputError(f"--format {layout} needs a package that is not installed: pip install "
                          "'onespp[zarr]'") from None

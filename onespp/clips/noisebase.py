@@ -64,7 +64,7 @@ def write_sequence(library: Any, data: DataSet, number: int, path: Path) -> None
     Args:
         library: zarr, version 3.
     """
-    from numcodecs import Blosc  # comes with zarr
+    from numcodecs import Blosc  # pyright: ignore[reportMissingImports]  # comes with zarr
 
     arrays = arrays_of(data, number)
     path.parent.mkdir(parents=True, exist_ok=True)

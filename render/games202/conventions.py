@@ -126,7 +126,7 @@ def _sample(frame: Frame) -> _Sample | None:
 def _epsilon(image: np.ndarray) -> float:
     """Relative rounding of an image's values, by whether half precision holds them."""
     half = np.array_equal(image.astype(np.float16).astype(np.float32), image, equal_nan=True)
-    return float(np.finfo(np.float16 if half else np.float32).eps) / 2
+    return float(np.finfo(np.float16).eps if half else np.finfo(np.float32).eps) / 2
 
 
 # Projection

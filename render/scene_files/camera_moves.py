@@ -66,7 +66,7 @@ def with_camera_move(scene: Scene, kind: str) -> Scene:
     frames = np.arange(0, max(PERIOD, scene.frames) + 0.5, 0.5)
     for halving in range(_HALVINGS):
         size = 0.5**halving
-        path = np.array([move(frame, size=size)[:3, 3] for frame in frames])
+        path = np.array([move(frame, size=size)[:3, 3] for frame in frames.tolist()])
         if around.is_free(np.concatenate([start[None, :3, 3], path]), margin):
             placed = Animation(partial(move, size=size))
             return replace(scene, camera=replace(scene.camera, world_from_camera=placed))
