@@ -8,7 +8,7 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.geometry.cameras import camera_from_screen, screen_from_camera
-from onespp.denoise.geometry.motion import inverses, world_motions
+from onespp.denoise.geometry.motion import at_rest, inverses, world_motions
 from onespp.denoise.jit.arrays import Bool, Float, Matrix3, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.vector import dot, opaque_matrix
@@ -115,10 +115,9 @@ def share_of_moving_lights(previous: Frame, frame: Frame) -> float:
     """Share of the shadow rays that went to lights that have moved."""
     some = _some(frame)
     id_ = frame["light_id"][some, some][np.abs(frame["light"][some, some]).sum(-1) > 0]
-    motions = world_motions(previous, frame)
-    is_light = (id_ >= 0) & (id_ < len(motions))
-    moved = (motions != np.eye(4)).any((1, 2))[id_[is_light].astype(int)]
-    return float(moved.sum() / max(len(id_), 1))
+    moved = ~at_rest(previous, frame)
+    lights = id_[(id_ >= 0) & (id_ < len(moved))].astype(int)
+    return float(moved[lights].sum() / max(len(id_), 1))
 
 
 def _some(frame: Frame) -> slice:

@@ -118,8 +118,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             [share of the light, above 0].
         noise_threshold: a smoothed innovation whose square is below this many of its variances
             is taken for noise; fewer where lights move [variances, 0 to 1e6].
-        sharp_min_gain: as `min_gain`, of visibility; less where shadows stand still, see
-            `merging.py` [1, 1e-6 to 1].
+        sharp_min_gain: as `min_gain`, of visibility; less where shadows stand still, up to 0.9
+            where lights move, see `innovation.py` [1, 1e-6 to 1].
         glossy_gain: share of the smoothed innovation that the history of glossy light takes;
             less where mirror directions stand still [1, 1e-6 to 1].
         change_alpha: weight of the current frame in the high frequencies of visibility where a
@@ -337,7 +337,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             1 / (self.plane_pixels * pixel_angle(frame)))
         if alone is not None:
             inverse_depth = dr.select(is_valid & alone, _LAMP, inverse_depth)
-            is_valid &= ~alone
+            is_valid = is_valid & ~alone
         scale = dr.select(is_valid, scale, stencil.Float(_BACKGROUND_SCALE))
         dx, dy = (dr.select(is_valid, slope, 0) for slope in surface.slope)
         return TangentPlane(inverse_depth, dx, dy, scale)
@@ -353,7 +353,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         alphas = layout.each(self.light_alpha, self.visibility_alpha)
         change = {SignalKind.DIFFUSE: self.light_change, SignalKind.GLOSSY: self.glossy_change,
                   SignalKind.VISIBILITY: self.visibility_change}
-        # Without visibility apart, diffuse light has the shadows in it, which are quick.
+        # Without visibility apart, diffuse light has the shadows in it, which are quick: it follows
+        # as where all lights move.
         is_quick = (SignalKind.DIFFUSE in layout.kinds and not layout.has_texture
                     and SignalKind.VISIBILITY not in layout.kinds)
         m = 1 if is_quick else min(2 * moving_lights, 1)

@@ -168,7 +168,7 @@ def follow_light(stencil: Stencil, sought: Sought, found: LookUp, known: Known) 
         there = along(beside, hidden & ~is_valid)
         there.values[0] = dr.minimum(there.values[0], 1)
         values = [dr.select(there.is_valid, t, v) for t, v in zip(there.values, values)]
-        is_valid |= there.is_valid
+        is_valid = is_valid | there.is_valid
     if known.shadows is not None:
         around = surroundings(stencil, stencil.Float(surface.id), known.shadows.table)
         was, moves = shadow_place(stencil, surface, known.shadows.plane, motion, around.motion,
