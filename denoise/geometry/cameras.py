@@ -49,3 +49,23 @@ def pixel_angle(frame: Frame) -> float:
     """
     (a, b), (c, d) = camera_from_screen(frame)[:2, :2]
     return math.sqrt(abs(a * d - b * c))
+
+
+def every(frame: Frame, count: int) -> slice:
+    """Rows, and columns, of about so many pixels, evenly spread."""
+    step = max(1, round((frame.height * frame.width / count) ** 0.5))
+    return slice(step // 2, None, step)
+
+
+def camera_points(frame: Frame, some: slice) -> np.ndarray:
+    """(rows, columns, 3) float64 camera-space positions of some rows and columns, not finite where
+    the depth is not.
+
+    Raises:
+        InputError: as `camera_from_screen`.
+    """
+    b, depth = camera_from_screen(frame), frame["depth"][some, some]
+    y, x = (np.arange(some.start, size, some.step)[:, None] + 0.5 for size in frame["id"].shape)
+    ray = (y * b[:, 1])[:, None] + x * b[:, 0] + b[:, 2]
+    with np.errstate(invalid="ignore", over="ignore"):
+        return depth[..., None] * ray

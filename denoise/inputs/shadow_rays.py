@@ -7,7 +7,7 @@ from typing import NamedTuple
 import drjit as dr
 import numpy as np
 
-from onespp.denoise.geometry.cameras import camera_from_screen, screen_from_camera
+from onespp.denoise.geometry.cameras import camera_points, every, screen_from_camera
 from onespp.denoise.geometry.motion import at_rest, inverses, world_motions
 from onespp.denoise.jit.arrays import Bool, Float, Matrix3, Vector3
 from onespp.denoise.jit.grid import Stencil
@@ -90,14 +90,11 @@ def light_sizes(frame: Frame) -> np.ndarray:
     """(objects + 2,) float32: twice the standard deviation of the points of each object that shadow
     rays asked for and, at `SUN` and -1, of the environment's sun and of the rest of it. Infinite
     for less than `_FEWEST_POINTS`."""
-    objects, some = len(frame.world_from_object), _some(frame)
+    objects, some = len(frame.world_from_object), every(frame, _LIGHT_SAMPLES)
     count = objects - SUN
-    depth, light, id_ = (frame[name][some, some] for name in ("depth", "light", "light_id"))
-    b = camera_from_screen(frame)
-    y, x = (np.arange(some.start, size, some.step)[:, None] + 0.5 for size in frame["id"].shape)
-    ray = (y * b[:, 1])[:, None] + x * b[:, 0] + b[:, 2]
+    light, id_ = (frame[name][some, some] for name in ("light", "light_id"))
     with np.errstate(invalid="ignore", over="ignore"):
-        point = depth[..., None] * ray + light @ frame.camera_from_world[:3, :3].T
+        point = camera_points(frame, some) + light @ frame.camera_from_world[:3, :3].T
         good = ((frame["id"][some, some] >= 0) & (np.abs(light).sum(-1) > 0)
                 & (np.abs(point) < _FARTHEST).all(-1) & (id_ >= SUN) & (id_ < objects))
     of, point = np.where(id_ < 0, count + id_, id_)[good].astype(int), point[good]
@@ -113,14 +110,9 @@ def light_sizes(frame: Frame) -> np.ndarray:
 
 def share_of_moving_lights(previous: Frame, frame: Frame) -> float:
     """Share of the shadow rays that went to lights that have moved."""
-    some = _some(frame)
+    some = every(frame, _LIGHT_SAMPLES)
     id_ = frame["light_id"][some, some][np.abs(frame["light"][some, some]).sum(-1) > 0]
     moved = ~at_rest(previous, frame)
     lights = id_[(id_ >= 0) & (id_ < len(moved))].astype(int)
     return float(moved[lights].sum() / max(len(id_), 1))
 
-
-def _some(frame: Frame) -> slice:
-    """Rows, and columns, of the pixels that lights are estimated from."""
-    step = max(1, round((frame.height * frame.width / _LIGHT_SAMPLES) ** 0.5))
-    return slice(step // 2, None, step)

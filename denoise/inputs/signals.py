@@ -34,7 +34,7 @@ from typing import NamedTuple
 import drjit as dr
 import numpy as np
 
-from onespp.denoise.jit.arrays import Color, Float
+from onespp.denoise.jit.arrays import Bool, Color, Float
 from onespp.denoise.jit.color import LuminanceColor, luminance, with_green
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import arrays_of
@@ -88,7 +88,8 @@ class Signals:
             there, and 0; None where lights are in groups, or V is not apart.
         roughness: where G is apart and its lobes are known.
         lobe: the same, but 1 where G is the (diffuse) light of a layer. of_gloss: texture of G,
-            where that is known (`layers.py`).
+            where that is known (`layers.py`). is_bare: where L is 0, nothing being diffuse; None
+            where that is not known.
     """
 
     kinds: tuple[SignalKind, ...]
@@ -100,6 +101,7 @@ class Signals:
     roughness: Float | None = None
     lobe: Float | None = None
     of_gloss: Texture = field(default_factory=Texture)
+    is_bare: Bool | None = None
 
     @property
     def groups(self) -> int:
@@ -108,7 +110,10 @@ class Signals:
 
     def color(self, signals: Sequence[Signal]) -> Color:
         """The colour that (filtered) signals make, in the order of `listed`."""
-        color = self.texture.modulate(_color(signals[0]))
+        light = _color(signals[0])
+        if self.is_bare is not None:  # what has leaked into it from others is none of its own
+            light = _black_where(self.is_bare, light)
+        color = self.texture.modulate(light)
         unshadowed = iter(self.unshadowed)
         for kind, signal in zip(self.kinds[1:], signals[1:], strict=True):
             if kind is SignalKind.GLOSSY:
@@ -140,7 +145,7 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
         texture = Texture(texture.albedo, Color(*load("emission")), texture.zero_albedo)
     light = Color(*[d + i for d, i in zip(load("direct"), load("indirect"))])
     kinds, apart, unshadowed, chosen, roughness = [SignalKind.DIFFUSE], [], [], None, None
-    texture_of_gloss, lobe, lit = Texture(), None, None
+    texture_of_gloss, lobe, lit, is_bare = Texture(), None, None, None
     if gloss and "specular" in frame:
         specular = Color(*load("specular"))
         light = Color(*[c - g for c, g in zip(light, specular)])
@@ -177,12 +182,12 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
     if lobe is not None and texture.albedo:
         white = [a >= 1 for a in texture.albedo]
         is_bare = (lobe < 1) & white[0] & white[1] & white[2]
-        more = _of_light(Color(*[dr.select(is_bare, c, 0) for c in light]))
+        more = _of_light(_black_where(~is_bare, light))
         apart[0] = Signal(*[g + m for g, m in zip(apart[0], more)])
-        light = Color(*[dr.select(is_bare, 0, c) for c in light])
+        light = _black_where(is_bare, light)
     diffuse = _of_light(Texture(texture.albedo).demodulate(light))
     return Signals(tuple(kinds), [diffuse, *apart], unshadowed, texture, chosen, lit, roughness,
-                   lobe, texture_of_gloss)
+                   lobe, texture_of_gloss, is_bare)
 
 
 def _capped(visibility: Float) -> Float:
@@ -193,6 +198,10 @@ def _capped(visibility: Float) -> Float:
 def _with(color: Color, visibility: Float, unshadowed: Color) -> Color:
     """A colour and a share of unshadowed light."""
     return Color(*[dr.fma(visibility, u, c) for u, c in zip(unshadowed, color)])
+
+
+def _black_where(mask: Bool, color: Color) -> Color:
+    return Color(*[dr.select(mask, 0, c) for c in color])
 
 
 def _of_light(light: Color) -> Signal:

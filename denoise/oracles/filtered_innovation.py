@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,10 +49,13 @@ def signals_of(frame: Frame) -> dict[str, np.ndarray]:
         light = light - v / chance * unshadowed[name]
     mirrored = np.zeros_like(light)
     if "roughness" in frame:  # where nothing is diffuse, all that is left is G
-        bare = (texture_of(frame) >= 1).all(-1) & (roughness_of(frame) < 1) & ~layers_of(frame)
-        mirrored = np.where(bare[..., None], light, 0)
+        mirrored = np.where(bare(frame)[..., None], light, 0)
     return {"L": (light - mirrored) / texture_of(frame),
             "G": specular / layer_texture_of(frame) + mirrored, **told}
+
+
+def bare(frame: Frame) -> np.ndarray:
+    return (texture_of(frame) >= 1).all(-1) & (roughness_of(frame) < 1) & ~layers_of(frame)
 
 
 def roughness_of(frame: Frame) -> np.ndarray:
@@ -550,23 +554,88 @@ def without_peaks(frame: Frame, image: np.ndarray, levels: int, m) -> tuple:
 
 def run(frames: list[Frame], m) -> np.ndarray:
     """The colour of the last frame."""
-    signals = [signals_of(frame) for frame in frames]
+    signals, changes = [signals_of(frame) for frame in frames], changes_of_light(frames)
     gloss, has_peaks = {}, "G" in signals[0]
     if "layer_share" in frames[0]:
         gloss = filtered([seen_in_gloss(frame) for frame in frames],
-                         [{"G": each.pop("G")} for each in signals], m, has_peaks)
-    out = filtered(frames, signals, m, has_peaks) | gloss
+                         [{"G": each.pop("G")} for each in signals], changes, m, has_peaks)
+    out = filtered(frames, signals, changes, m, has_peaks) | gloss
     if "light" in frames[-1] and m.follow_shadows:
         for name in unshadowed_of(frames[-1]):
             own = frames[-1]["group"] == int(name) if name.isdigit() else True
             _, q = sharpness(frames[-1], own & np.ones(frames[-1]["id"].shape, bool))
             out[name] = out[name] * (1 - 0.75 * q**8)[..., None]
+    if "L" in out and "roughness" in frames[-1]:
+        out["L"] = np.where(bare(frames[-1])[..., None], 0, out["L"])
     color = own_colour_facing_away(frames[-1], in_slits(frames[-1], color_of(frames[-1], out), m))
     return repaid(color, frames[-1]["id"])
 
 
-def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
-             has_peaks: bool) -> dict[str, np.ndarray]:
+class Lights(NamedTuple):
+    """By what lights have changed, of each channel, and what share that leaves, NaN if unknown."""
+
+    ratio: np.ndarray
+    left: float
+
+    @property
+    def rests(self) -> bool:
+        return bool((self.ratio == 1).all() and self.left < 0.05)
+
+    @property
+    def sudden(self) -> float:
+        return max(self.left - 0.2, 0.0) / 0.8 if self.left >= 0 else 0.0
+
+
+def changes_of_light(frames: list[Frame]) -> list[Lights]:
+    """Of each frame since the one before."""
+    unknown = Lights(np.ones(3), np.nan)
+    return [unknown, *(lights_between(*both) or unknown for both in pairwise(frames))]
+
+
+def lights_between(previous: Frame, frame: Frame) -> Lights | None:
+    (height, width), places = frame["id"].shape, []
+    step = max(1, round((height * width / 512) ** 0.5))
+    for y, x in np.ndindex(height, width):
+        i = previous["id"][y, x]
+        if (y % step != step // 2 or x % step != step // 2 or i < 0 or not np.array_equal(
+                previous.world_from_object[i], frame.world_from_object[i])):
+            continue
+        at = frame.screen_from_world @ [*previous["position"][y, x].astype(float), 1]
+        column, row = np.floor(at[:2] / at[3]).astype(int)
+        if at[3] <= 0 or not (0 <= row < height and 0 <= column < width):
+            continue
+        if frame["id"][row, column] == i and abs(frame["depth"][row, column] / at[3] - 1) < 0.02:
+            places.append([each[name][where].astype(float) / np.maximum(each["albedo"][where], 0.05)
+                           for name in ("unshadowed", "direct")
+                           for each, where in ((previous, (y, x)), (frame, (row, column)))])
+    if len(places) < 32:
+        return None
+    old, new, direct_before, direct = np.maximum(np.moveaxis(np.array(places), 1, 0), 0)
+    before, now, arrived_before, arrived = (
+        luminance(light).sum() for light in (old, new, direct_before, direct))
+    gains = [np.clip(b / a, 1 / 8, 8) if a > 0 else 1.0
+             for a, b in ((before, now), (arrived_before, arrived))]
+    if max(gains) > 4 / 3 * min(gains) or not np.maximum(old, new).max() > 0:
+        return None
+
+    def left(ratio: Any) -> float:
+        a, b = luminance(old * ratio), luminance(new)
+        return np.abs(a - b).sum() / np.maximum(a, b).sum()
+
+    each = new / np.maximum(old, 1e-6 * np.maximum(old, new).max())
+    ratio = np.ones(3)
+    for c in range(3):
+        weights = np.maximum(old, new)[:, c]
+        order = np.argsort(each[:, c])
+        half = np.cumsum(weights[order]) >= weights.sum() / 2
+        ratio[c] = np.clip(each[order[np.argmax(half)], c], 1 / 8, 8) if weights.any() else 1
+    if left(1) < 0.01 or (np.abs(ratio - 1) < 0.01).all() or left(ratio) > 0.4 * left(1):
+        return Lights(np.ones(3), left(1))
+    return Lights(ratio, left(ratio))
+
+
+def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
+             changes: list[Lights], m, has_peaks: bool) -> dict[str, np.ndarray]:
     """Signals of the last frame."""
     sharp_levels = m.sharp_innovation_levels, m.sharp_output_levels
     settings = {
@@ -578,10 +647,16 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
     lengths: dict[str, np.ndarray] = {}  # by what has one, see `length_of`
     previous, out = None, {}
     own = m
-    for frame, signals in zip(frames, given, strict=True):
-        m = own
+    for frame, signals, lights in zip(frames, given, changes, strict=True):
+        m, share = own, 0.0
         if previous is not None and m.follow_shadows and "light" in frame and len(given[0]) > 1:
-            m = under_moving_lights(previous, frame, own)
+            share = share_of_moving_lights(previous, frame)
+            m = under_moving_lights(own, share)
+        light_threshold = m.noise_threshold
+        if previous is not None and lights.rests and share == 0:
+            light_threshold = 4 * m.noise_threshold
+            if np.array_equal(previous.world_from_object, frame.world_from_object):
+                m = replace(m, min_gain=m.min_gain / 2)
         if "V" in signals:
             signals = {**signals, "V": of_lit_neighbours(frame, signals["V"], m)}
         found = np.zeros(frame["id"].shape, bool)
@@ -608,6 +683,8 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
                 both = np.concatenate([kept[name][0], *(k[..., None] for k in kept[name][1:])], -1)
                 both, _ = look_up(previous, frame, both, m)
                 h, s2, samples = both[..., :-2], both[..., -2], both[..., -1]
+                if name in "LG":
+                    h, s2 = h * lights.ratio, s2 * luminance(lights.ratio) ** 2
                 e = np.where(found[..., None], d - omega[..., None] * h, 0)
                 energy = smooth(frame, lum(e)[..., None] ** 2, found, 2, m)[..., 0]
             narrow = narrowness(frame, told, m) if follows else np.zeros(found.shape)
@@ -644,15 +721,17 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
             if sparse:
                 norm = norm_of(frame, here, found, smoothing, m, narrow)[..., None]
                 change = np.clip(h + norm * wide, -0.5, 2) - h
-            left = length_left(name, wide, q, energy, change, h, p, m, moving)
+            k = light_threshold if name == "L" else m.noise_threshold
+            known = lights.sudden * np.maximum(np.abs(lum(d - e)), np.abs(lum(d - e + wide)))
+            left = length_left(name, wide, q, energy, change, h, p, k, known, moving)
             if not sparse:
                 key = length_of(frame, name)
                 ns[key] = np.maximum(np.minimum(ns[key], np.where(found, left, 1)), 1)
             parts[name] = (e, h, wide, q, energy, s2, samples, omega, here, lone, change, left,
-                           spatial, narrow, turn, moving)
+                           spatial, narrow, turn, moving, known)
         for name, d in signals.items():
             (e, h, wide, q, energy, s2, samples, omega, here, lone, change, left, spatial,
-             narrow, turn, moving) = parts[name]
+             narrow, turn, moving, sudden) = parts[name]
             alpha, _, levels, sigma, _ = settings.get(name, visible)
             sparse = name.isdigit()
             levels = max(levels - 1, 1) if sparse else levels
@@ -663,12 +742,16 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
             follow = np.maximum(m.glossy_gain * (2 + np.minimum(30 * turn, 1)) / 3
                                 if "roughness" in frame else m.glossy_gain, alpha)
             if name != "G":
-                certain = 1 - m.noise_threshold * q / np.maximum(lum(wide) ** 2, 1e-20)
+                k = light_threshold if name == "L" else m.noise_threshold
+                certain = 1 - k * q / np.maximum(lum(wide) ** 2, 1e-20)
                 expected = (m.expected_change * lum(h + wide)) ** 2
                 slow = m.min_gain * expected / np.maximum(expected + q, 1e-20)
                 sharp = m.sharp_min_gain * (1 if moving is None else 0.4 + 0.6 * moving)
                 follow = np.maximum(certain, slow if name == "L" else sharp)
                 a = a if name == "L" else np.maximum(a, m.change_alpha * certain)
+            if name in "LG":
+                of = q if name == "L" else energy / 48
+                follow = np.maximum(follow, sudden**2 / np.maximum(sudden**2 + of, 1e-20))
             if sparse:
                 follow = np.maximum(follow, 1 - known)
                 noise = most = coin((h + change)[..., 0])
@@ -713,14 +796,18 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]], m,
     return out
 
 
-def under_moving_lights(previous: Frame, frame: Frame, m):
-    """The method as it is where so many rays went to lights that have moved."""
+def share_of_moving_lights(previous: Frame, frame: Frame) -> float:
+    """Twice the share of the rays that went to lights that have moved, at most 1."""
     asked = np.abs(frame["light"]).sum(-1) > 0
     ids = frame["light_id"]
     known = asked & (ids >= 0) & (ids < len(frame.world_from_object))
     moved = [not np.array_equal(*both) for both in zip(previous.world_from_object,
                                                        frame.world_from_object)]
-    share = min(2 * sum(moved[int(i)] for i in ids[known]) / max(asked.sum(), 1), 1)
+    return min(2 * sum(moved[int(i)] for i in ids[known]) / max(asked.sum(), 1), 1)
+
+
+def under_moving_lights(m, share: float):
+    """The method as it is where so many rays went to lights that have moved."""
     return replace(
         m, min_gain=m.min_gain + share * (1 - m.min_gain), noise_threshold=m.noise_threshold
         * (1 - share / 2), expected_change=m.expected_change / max(1 - share, 1e-4),
@@ -739,13 +826,13 @@ def coin(visibility: np.ndarray) -> np.ndarray:
 
 
 def length_left(name: str, wide: np.ndarray, q: np.ndarray, energy: np.ndarray,
-                change: np.ndarray, h: np.ndarray, p: float, m,
+                change: np.ndarray, h: np.ndarray, p: float, k: float, known: np.ndarray,
                 moving: np.ndarray | None = None) -> np.ndarray:
-    """n, or N, that a change of light leaves at most."""
-    k = m.noise_threshold * (1 if name in "LG" else 0.5 if moving is None else 4 - 3.5 * moving)
+    """n, or N, that a change of light leaves at most; known: what is known to have changed."""
+    threshold = k * (1 if name in "LG" else 0.5 if moving is None else 4 - 3.5 * moving)
     luminance2 = size = lum(wide) ** 2
     if name.isdigit():
-        certain = 1 - k * q / np.maximum(size, 1e-20)
+        certain = 1 - threshold * q / np.maximum(size, 1e-20)
         return coin((h + change)[..., 0]) / np.maximum(
             p * (np.maximum(certain, 0) * change[..., 0]) ** 2, 1e-20)
     if name != "V":
@@ -753,8 +840,9 @@ def length_left(name: str, wide: np.ndarray, q: np.ndarray, energy: np.ndarray,
         size = np.maximum(size, color / 4 if name == "L" else color)
     alike = np.minimum(luminance2, energy) / np.maximum(np.maximum(luminance2, energy), 1e-20)
     q = energy / 48 if name == "G" else q
-    certain = 1 - k * q * (1 - alike**4) / np.maximum(size, 1e-20)
+    certain = 1 - threshold * q * (1 - alike**4) / np.maximum(size, 1e-20)
     size = size * np.maximum(certain, 0) ** 2
+    size = size if name == "V" else np.maximum(size, known**2)
     size = np.minimum(size, energy**2 / np.maximum(size, 1e-20))
     noise = np.maximum(energy - size, energy / 16)
     return np.where(size > 1e-20, noise / np.maximum(p * size, 1e-20), 1e6)

@@ -13,7 +13,16 @@ from onespp.scenes.description import Scene
 
 from .camera import backwards, cut, grazing
 from .extent import far, huge, sky, tiny
-from .light import color, emitters, fireflies, moving_light, switched_off, switched_on
+from .light import (
+    color,
+    emitters,
+    fireflies,
+    glossy_color,
+    moving_light,
+    one_of_two,
+    switched_off,
+    switched_on,
+)
 from .motion import appears, behind, enters, leaves, mirrored, shrinks, uncovers, vanishes
 from .parts import EVENT
 from .reflection import glossy_floor, mirror, moving_mirror
@@ -41,6 +50,8 @@ HARD: Mapping[str, Hard] = MappingProxyType({
     "switched-on": Hard(switched_on, EVENT),
     "switched-off": Hard(switched_off, EVENT),
     "color": Hard(color, EVENT),
+    "glossy-color": Hard(glossy_color, EVENT, diffuse=False),
+    "one-of-two": Hard(one_of_two, EVENT, diffuse=False),
     "moving-light": Hard(moving_light),
     "emitters": Hard(emitters),
     "fireflies": Hard(fireflies, diffuse=False),

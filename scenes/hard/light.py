@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from onespp.scenes.animation import Animation
-from onespp.scenes.description import Color, Scene, Shape, Sphere
+from onespp.scenes.description import Color, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.materials import diffuse, metal
 from onespp.scenes.transforms import rotate, scale, translate
 
-from .parts import EVENT, LIGHT, X, at, ball, lamp, scene, surroundings
+from .parts import EVENT, LIGHT, X, Y, at, ball, lamp, scene, surroundings
 
 _THINGS = (ball(at(-0.8, 0.5, 0)), ball(at(0.9, 0.35, 0.4, 0.35), (0.15, 0.5, 0.2), name="other"))
 _DIM = (0.08, 0.09, 0.1)
@@ -34,6 +34,22 @@ def switched_off() -> Scene:
 def color() -> Scene:
     return scene("color", "A lamp that turns from white to red over a still scene",
                  *surroundings(), *_THINGS, lamp(_at_event(LIGHT, (20.0, 4.0, 2.0))))
+
+
+def glossy_color() -> Scene:
+    """What few samples tell of, reflections in metal, changes with all the light."""
+    return scene("glossy-color", "A lamp that turns from white to red over a still metal floor",
+                 *surroundings(floor=metal((0.85, 0.85, 0.9), 0.2)), *_THINGS,
+                 lamp(_at_event(LIGHT, (20.0, 4.0, 2.0))))
+
+
+def one_of_two() -> Scene:
+    """Some of the light stays as it was, elsewhere than most of it."""
+    side = Shape("side", Rectangle(), diffuse((0.0, 0.0, 0.0)), translate((-2.4, 1.6, 1.2))
+                 @ rotate(Y, 60) @ scale((0.4, 0.4, 1)), (3.0, 4.0, 6.0))
+    return scene("one-of-two", "One of two lamps is switched off over a still metal floor",
+                 *surroundings(floor=metal((0.95, 0.8, 0.5), 0.25)), *_THINGS, side,
+                 lamp(_at_event(LIGHT, (0.0, 0.0, 0.0))))
 
 
 def moving_light() -> Scene:

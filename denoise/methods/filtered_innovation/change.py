@@ -10,26 +10,30 @@ is worth its while: the noise N of a frame falls as 1 / n, the error of history,
 squared change D, does not. With
 
     r = min(l(S[e])^2, W) / max(l(S[e])^2, W),    c = 1 - k Q (1 - r^4) / D_0,
-    D_1 = max(c, 0)^2 D_0,                        D = min(D_1, W^2 / D_1),
+    D_1 = max(c, 0)^2 D_0,                        D = min(D_2, W^2 / D_2),  D_2 = max(D_1, D_u),
 
 D_0 is the largest square of l(S[e]), of its red and of half of its blue, those of diffuse light
 halved once more: its colours are over albedo, and noisy. What is as large all around as its mean is
 (r = 1: a shadow that is there at once) is no noise, however few pixels have told of it. And where
 the mean is far larger than what happens around (a quiet place near a change), it is none of the
-place's own.
+place's own. D_u is what unshadowed light tells (`inputs/light_change.py`): the square of the share
+of the light that has changed at once, times the greater of l(h) and l(h + S[e]).
 
 All of it is of the surroundings: were n of the pixel's own noise, a would go with it, and the mean
 of the history be off (3 % of energy too much with n of h itself).
 
-Of visibility k is half of that, and four times that where shadow rays tell that shadow and surface
-stand still: near a contact S is of few rays, and has little else to tell there.
+Of diffuse light k is four times that where lights are known to be as they were. Of visibility it is
+half of that, and four times that where shadow rays tell that shadow and surface stand still: near a
+contact S is of few rays, and has little else to tell there.
 
-Of a sparse signal N is v (1 - v), D = max(c, 0)^2 (S[e] / S[omega])^2, and what is limited is the
-sum of omega.
+Of a sparse signal D_u is 0, N is v (1 - v), D = max(c, 0)^2 (S[e] / S[omega])^2, and what is
+limited is the sum of omega.
 """
 
 # pyright: standard
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import drjit as dr
 
@@ -42,7 +46,7 @@ from .layout import SignalLayout, Smoothed
 MIN_ENERGY = 1e-20             # square of a luminance that is taken for 0
 LEAST_NOISE = 0.01             # variance of a sample of visibility
 _LEAST_SHARE = 1 / 16          # of W that is noise
-_GLOSSY_SAMPLES = 48.0         # W / Q of glossy light, whose Q is not known
+GLOSSY_SAMPLES = 48.0          # W / Q of glossy light, whose Q is not known
 _AT_REST, _IN_MOTION = 4.0, 0.5  # times k, of visibility
 _COLOR = 0.25                  # share of squared red and blue, of diffuse light
 _BLUE = 0.25
@@ -54,27 +58,42 @@ def certainty(spread: Float, size: Float, threshold: Float) -> Float:
     return 1 - threshold * spread / dr.maximum(size, MIN_ENERGY)
 
 
-def lengths_left(layout: SignalLayout, innovations: Innovations, smoothed: Smoothed,
-                 changes: list[Float], threshold: Float, weights: list[Float]) -> list[Float]:
+class Doubts(NamedTuple):
+    """What a change is judged by: k, of diffuse light and of others; p of each signal; and the
+    share of the light that has changed at once."""
+
+    light_threshold: Float
+    threshold: Float
+    weights: list[Float]
+    sudden: Float
+
+
+def lengths_left(layout: SignalLayout, signals: list[Signal], innovations: Innovations,
+                 smoothed: Smoothed, changes: list[Float], doubts: Doubts) -> list[Float]:
     """n of each signal, or N, that a change leaves at most; may be below 1.
 
     Args:
-        changes: S[e] / S[omega] of each sparse signal. threshold: k. weights: p of each signal.
+        changes: S[e] / S[omega] of each sparse signal.
     """
     spreads = iter(smoothed.visibility_spread)
     left = []
-    for s, (kind, wide, p) in enumerate(zip(layout.kinds, smoothed.each, weights, strict=True)):
-        group, follower, k = layout.group(s), layout.follower(s), threshold
+    for s, (kind, wide, p) in enumerate(
+            zip(layout.kinds, smoothed.each, doubts.weights, strict=True)):
+        group, follower, k = layout.group(s), layout.follower(s), doubts.threshold
+        known = None
         if kind is SignalKind.VISIBILITY:
             spread = next(spreads)
-            k = threshold * (_IN_MOTION if follower is None else dr.fma(
+            k = doubts.threshold * (_IN_MOTION if follower is None else dr.fma(
                 innovations.unrest[follower], _IN_MOTION - _AT_REST, _AT_REST))
         elif kind is SignalKind.GLOSSY:
-            spread = smoothed.energies[s] / _GLOSSY_SAMPLES
+            spread = smoothed.energies[s] / GLOSSY_SAMPLES
         else:
-            spread = smoothed.diffuse_spread
+            spread, k = smoothed.diffuse_spread, doubts.light_threshold
+        if kind is not SignalKind.VISIBILITY:
+            known = dr.square(known_change(
+                signals[s], innovations.signals[s], wide, doubts.sudden))
         if group is None:
-            left.append(_left(kind, wide, spread, smoothed.energies[s], k, p))
+            left.append(_left(kind, wide, spread, smoothed.energies[s], k, p, known))
             continue
         certain = certainty(spread, dr.square(wide.luminance), k)
         size = dr.square(dr.maximum(certain, 0) * changes[group])
@@ -84,8 +103,8 @@ def lengths_left(layout: SignalLayout, innovations: Innovations, smoothed: Smoot
 
 
 def _left(kind: SignalKind, wide: Signal, spread: Float, energy: Float, threshold: Float,
-          p: Float) -> Float:
-    """n of a signal that is not sparse; energy: W."""
+          p: Float, known: Float | None) -> Float:
+    """n of a signal that is not sparse; energy: W, known: D_u."""
     luminance2 = size = dr.square(wide.luminance)
     if wide.red is not None and wide.blue is not None:
         color = dr.maximum(dr.square(wide.red), _BLUE * dr.square(wide.blue))
@@ -93,9 +112,17 @@ def _left(kind: SignalKind, wide: Signal, spread: Float, energy: Float, threshol
     agree = dr.minimum(luminance2, energy) / dr.maximum(dr.maximum(luminance2, energy), MIN_ENERGY)
     certain = certainty(spread * (1 - dr.square(dr.square(agree))), size, threshold)
     size = size * dr.square(dr.maximum(certain, 0))
+    if known is not None:
+        size = dr.maximum(size, known)
     size = dr.minimum(size, energy * (energy / dr.maximum(size, MIN_ENERGY)))
     noise = dr.maximum(energy - size, energy * _LEAST_SHARE)
     return dr.select(size > MIN_ENERGY, noise / dr.maximum(p * size, MIN_ENERGY), _KEPT)
+
+
+def known_change(signal: Signal, innovation: Signal, wide: Signal, share: Float) -> Float:
+    """A share of l(h) or l(h + S[e]), whichever is more."""
+    before = signal.luminance - innovation.luminance
+    return share * dr.maximum(dr.abs(before), dr.abs(before + wide.luminance))
 
 
 def coin_variance(visibility: Float) -> Float:

@@ -25,7 +25,10 @@ is two thirds of that where mirror directions stand still; g' two fifths where n
 by `shadow_motion.py`, nor the surface moves: near a contact S is narrow, and would bring its noise
 into a shadow that stands still. Where lights move, light changes everywhere: with m twice the
 share of shadow rays that went to such, at most 1, g becomes g + m (1 - g), b / (1 - m) and
-k (1 - m / 2), and g' grows to 9/10.
+k (1 - m / 2), and g' grows to 9/10. Where nothing moves, but the camera, and lights are known to be
+as they were (`inputs/light_change.py`), g is half of that. Where lights are known to have changed,
+all alike, h of diffuse and glossy light has changed with them before it is compared; and by what
+else they have changed at once, f of these is at least L / (L + Q) of that change (`change.py`).
 
     s^2 <- (1 - a)^2 s^2 + a^2 s_0^2,   s_0^2 = max(W[l(e)^2] - s^2, W[l(e)^2] / 4)
 
@@ -90,12 +93,13 @@ from onespp.denoise.history.shadow_motion import (
 )
 from onespp.denoise.inputs.signals import Chosen, Signal
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
-from onespp.denoise.jit.arrays import Float
+from onespp.denoise.jit.arrays import Float, Vector3
+from onespp.denoise.jit.color import LUMINANCE
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import mapped
 from onespp.denoise.jit.vector import dot
 
-from .layout import LUMINANCE_PLACE, History, SignalLayout, Smoothed
+from .layout import LUMINANCE_PLACE, History, NoisySignal, SignalLayout, Smoothed
 from .noise import MAX_ENERGY, spatial_variances
 from .output import FEWEST_SAMPLES
 from .shadows import Shadows, Surroundings
@@ -162,13 +166,14 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
                      motion: Motion, records: Float, around: Surroundings,
                      tests: ReprojectionTests, max_history_length: Float,
                      falloff_scale: Float, lobes: Lobes | None,
-                     rest: Motion | None) -> Innovations:
+                     rest: Motion | None, ratio: Vector3) -> Innovations:
     """The innovation of each signal.
 
     Args:
         motion: of `motion_between`. records: of `pack_history`.
         around: of `look_around`, smoothed. falloff_scale: of `penumbra.footprint_falloff`.
         lobes: of `reflections.lobes_between`. rest: of `texture.at_rest_between`.
+        ratio: of `inputs/light_change.py`, red, green and blue.
     """
     place = locate(stencil, surface, motion, tests.plane_tolerance)
     record_words_ = record_words(layout.record_values)
@@ -176,6 +181,7 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
         stencil, place, records, layout.record_values, tests.min_cosine, words=record_words_,
         scattered=LUMINANCE_PLACE if layout.has_texture else None)
     lengths, history = layout.unpack(words)
+    history = [_brought_up_to_date(old, ratio) for old in history]
     omegas = weights_of(layout, chosen)
     e, sparse = [], []
     for signal, old, omega in zip(signals, history, omegas, strict=True):
@@ -222,6 +228,18 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
                        None if lobes is None else turned(lobes, surface.normal, place),
                        _unrest(stencil, shadows, place), misses, at_rest, spatial,
                        mapped(lambda near: falloff_scale * near, around.contact))
+
+
+def _brought_up_to_date(old: NoisySignal, ratio: Vector3) -> NoisySignal:
+    """History in the light of today: that of visibility is as it was."""
+    red, luminance_, blue = old.signal
+    if red is None or blue is None:
+        return old
+    r, g, b = LUMINANCE
+    more = dr.fma((ratio.x - ratio.y) * r, red, (ratio.z - ratio.y) * b * blue)
+    whole = dr.fma(ratio.x, r, dr.fma(ratio.y, g, ratio.z * b))
+    signal = Signal(ratio.x * red, dr.fma(ratio.y, luminance_, more), ratio.z * blue)
+    return old._replace(signal=signal, variance=old.variance * dr.square(whole))
 
 
 def _unrest(stencil: Stencil, shadows: list[Shadows], place: Place) -> list[Float]:

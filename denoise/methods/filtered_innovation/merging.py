@@ -16,7 +16,15 @@ from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import mapped
 
-from .change import MIN_ENERGY, certainty, coin_variance, lengths_left
+from .change import (
+    GLOSSY_SAMPLES,
+    MIN_ENERGY,
+    Doubts,
+    certainty,
+    coin_variance,
+    known_change,
+    lengths_left,
+)
 from .innovation import Innovations, ShadowInnovation, weights_of
 from .layout import NoisySignal, Pair, SignalLayout, Smoothed
 from .noise import MAX_ENERGY, NO_SAMPLE, PRIOR_VARIANCE, spatial_variances
@@ -40,21 +48,19 @@ class Gains(NamedTuple):
     """How history follows.
 
     Attributes:
-        alphas: of each signal. min_gain: g. expected_change: b. noise_threshold: k.
-        sharp_min_gain: g'.
+        alphas: of each signal. min_gain: g. expected_change: b. sharp_min_gain: g'.
         glossy_gain: g''. change_alpha: r. fade_frames: until the last filter has faded.
-        changes: p of each signal, of `change.py`.
+        doubts: of `change.py`.
     """
 
     alphas: list[Float]
     min_gain: Float
     expected_change: Float
-    noise_threshold: Float
     sharp_min_gain: Float
     glossy_gain: Float
     change_alpha: Float
     fade_frames: Float
-    changes: list[Float]
+    doubts: Doubts
 
 
 class Merged(NamedTuple):
@@ -82,8 +88,7 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
     first = [_only_sample(y, omega) for y, omega in zip(signals, omegas) if omega is not None]
     changes = [_change(wide.luminance, weight, sparse.history) for wide, weight, sparse in zip(
         smoothed.each[len(dense):], smoothed.weights, innovations.sparse, strict=True)]
-    left = lengths_left(layout, innovations, smoothed, changes, gains.noise_threshold,
-                        gains.changes)
+    left = lengths_left(layout, signals, innovations, smoothed, changes, gains.doubts)
     lengths = list(innovations.lengths)
     for s in dense:
         lengths[layout.length(s)] = dr.minimum(lengths[layout.length(s)], left[s])
@@ -113,12 +118,12 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
         alpha, gain = gains.alphas[s], gains.glossy_gain
         if kind is SignalKind.DIFFUSE:
             certain = certainty(smoothed.diffuse_spread, dr.square(wide.luminance),
-                                gains.noise_threshold)
+                                gains.doubts.light_threshold)
             change = gains.expected_change * (signal.luminance - e.luminance + wide.luminance)
             gain = dr.maximum(certain, gains.min_gain * expected_gain(
-                dr.minimum(dr.square(change), MAX_ENERGY), smoothed.diffuse_spread))
+                change, smoothed.diffuse_spread))
         elif kind is SignalKind.VISIBILITY:
-            certain = certainty(visible[s], dr.square(wide.luminance), gains.noise_threshold)
+            certain = certainty(visible[s], dr.square(wide.luminance), gains.doubts.threshold)
             least, f = gains.sharp_min_gain, layout.follower(s)
             if f is not None:
                 least = least * dr.fma(1 - OF_STILL, innovations.unrest[f], OF_STILL)
@@ -128,6 +133,11 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
             alpha = dr.maximum(alpha, turned)
             moves = dr.minimum(turned * (1 / _MOVING_IMAGE), 1)
             gain = gain * dr.fma(1 - OF_STILL_IMAGE, moves, OF_STILL_IMAGE)
+        if kind is not SignalKind.VISIBILITY:
+            spread = (smoothed.diffuse_spread if kind is SignalKind.DIFFUSE
+                      else smoothed.energies[s] / GLOSSY_SAMPLES)
+            gain = dr.maximum(gain, expected_gain(
+                known_change(signal, e, wide, gains.doubts.sudden), spread))
         if omega is None:
             a = dr.maximum(1 / lengths[layout.length(s)], alpha)
             energy = smoothed.energies[s]
@@ -174,8 +184,9 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
 
 
 def expected_gain(change: Float, spread: Float) -> Float:
-    """L / (L + Q); change: L."""
-    return change / dr.maximum(change + spread, MIN_ENERGY)
+    """L / (L + Q); change: the root of L."""
+    size = dr.minimum(dr.square(change), MAX_ENERGY)
+    return size / dr.maximum(size + spread, MIN_ENERGY)
 
 
 def _only_sample(signal: Signal, omega: Float) -> Float:

@@ -25,12 +25,19 @@ import numpy as np
 from onespp.denoise.filters.atrous import BACKGROUND, LARGEST_LEVELS
 from onespp.denoise.filters.facing_away import LARGEST_SHARE, colors_facing_away
 from onespp.denoise.geometry.cameras import pixel_angle
+from onespp.denoise.geometry.motion import at_rest
 from onespp.denoise.history.records import RecordState, no_history
 from onespp.denoise.history.reflections import lobes_between
 from onespp.denoise.history.reprojection import ReprojectionTests, motion_between, without_images
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
 from onespp.denoise.inputs.demodulation import Texture, read_texture
 from onespp.denoise.inputs.layers import surface_of_gloss
+from onespp.denoise.inputs.light_change import (
+    LightChange,
+    LightSample,
+    light_change,
+    sample_light,
+)
 from onespp.denoise.inputs.shadow_rays import (
     ShadowRays,
     has_shadow_rays,
@@ -46,7 +53,7 @@ from onespp.denoise.inputs.signals import (
     read_signals,
 )
 from onespp.denoise.inputs.surface import Surface, TangentPlane, read_surface
-from onespp.denoise.jit.arrays import Bool, Color, Float
+from onespp.denoise.jit.arrays import Bool, Color, Float, Vector3
 from onespp.denoise.jit.fastmath import LOG2E
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import evaluate
@@ -60,6 +67,7 @@ from onespp.denoise.methods.parameters import (
 from onespp.render.channels import SHADOW
 from onespp.render.frame import Frame
 
+from .change import Doubts
 from .layout import ENERGY_LEVELS, History, SignalLayout
 from .merging import Gains
 from .output import narrowed
@@ -70,15 +78,19 @@ from .texture import LEVELS, at_rest_between
 _LAMP = 2 * BACKGROUND    # 1/z of what is `alone`: far from any plane, and from background
 LARGE = 640**2            # pixels of an image whose last filter has a level more
 _UNDER_MOVING_LIGHTS = 0.9  # `sharp_min_gain`
+_IN_STILL_WORLD = 0.5     # times `min_gain`
+_LIGHTS_AT_REST = 4.0     # times `noise_threshold`, of diffuse light
 _LEAST_SHARE = 1e-4       # that `expected_change` is divided by
 _BACKGROUND_SCALE = 1e3   # of 1/z of background and lamps: only their like counts
 
 
 @dataclass(frozen=True)
 class InnovationState(RecordState[Passes]):
-    """`RecordState`, and that of glossy light where it is of other layers."""
+    """`RecordState`, that of glossy light where it is of other layers, and what the frame told of
+    its lights."""
 
     layered: InnovationState | None = None
+    lights: LightSample | None = None
 
 
 class _Given(NamedTuple):
@@ -86,7 +98,7 @@ class _Given(NamedTuple):
 
     alone: where a surface reflects (almost) nothing, or faces away, and mixes with its like alone.
     roughness, lobe: as of `Signals`, where there is glossy light; its image is the sharper the less
-    the former is, its history the longer the more the latter is.
+    the former is, its history the longer the more the latter is. change: of the lights.
     """
 
     frame: Frame
@@ -100,6 +112,7 @@ class _Given(NamedTuple):
     hit_distance: Float
     roughness: Float | None
     lobe: Float | None
+    change: LightChange
 
 
 @dataclass(frozen=True)
@@ -111,13 +124,15 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             glossy light [1, 1e-6 to 1].
         visibility_alpha: the same of visibility [1, 1e-6 to 1].
         min_gain: least share of the smoothed innovation that the history of diffuse light takes,
-            where that is free of noise; all of it where lights move, and where frames have albedo
-            and no visibility [1, 1e-6 to 1].
+            where that is free of noise; half of it where nothing moves and lights are known to be
+            as they were, all of it where lights move, and where frames have albedo and no
+            visibility [1, 1e-6 to 1].
         expected_change: how much diffuse light is expected to change from frame to frame; where
             the noise of the smoothed innovation is more than that, history takes less of it
             [share of the light, above 0].
         noise_threshold: a smoothed innovation whose square is below this many of its variances
-            is taken for noise; fewer where lights move [variances, 0 to 1e6].
+            is taken for noise; fewer where lights move, and four times as many, of diffuse light,
+            where they are known to be as they were [variances, 0 to 1e6].
         sharp_min_gain: as `min_gain`, of visibility; less where shadows stand still, up to 0.9
             where lights move, see `innovation.py` [1, 1e-6 to 1].
         glossy_gain: share of the smoothed innovation that the history of glossy light takes;
@@ -235,6 +250,10 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         hit_distance = stencil.opaque(0)  # where a frame does not say
         if rays is not None and "hit_distance" in frame:
             (hit_distance,) = stencil.load(np.asarray(frame["hit_distance"], np.float32))
+        change, lights = LightChange(), None
+        if light.unshadowed:
+            change = light_change(state.lights, previous, frame)
+            lights = sample_light(frame)
         layout = self._layout(light, rays is not None, stencil)
         alone, away = light.texture.zero_albedo, None
         if light.unshadowed:  # by Mitsuba, whose silhouettes are so
@@ -254,20 +273,20 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         if of_gloss is None or SignalKind.GLOSSY not in layout.kinds:
             output, own, after = self._filtered(_Given(
                 frame, layout, light.listed, light.chosen, surface, alone, light.lit, rays,
-                hit_distance, light.roughness, light.lobe), state)
-            return finished(output, own, after), replace(after, layered=None)
+                hit_distance, light.roughness, light.lobe, change), state)
+            return finished(output, own, after), replace(after, layered=None, lights=lights)
         signals, glossy = list(light.listed), layout.kinds.index(SignalKind.GLOSSY)
         rest, only_gloss = layout.without_gloss()
         (gloss,), _, layered = self._filtered(_Given(
             of_gloss, only_gloss, [signals.pop(glossy)], None, read_surface(of_gloss, stencil),
             read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, None, hit_distance,
-            light.roughness, light.lobe),
+            light.roughness, light.lobe, change),
             state.layered or InnovationState(stencil, no_history(stencil)))
         output, own, after = self._filtered(_Given(
             frame, rest, signals, light.chosen, surface, alone, light.lit, rays, hit_distance,
-            None, None), state)
+            None, None, change), state)
         output.insert(glossy, gloss)
-        return finished(output, own, after), replace(after, layered=layered)
+        return finished(output, own, after), replace(after, layered=layered, lights=lights)
 
     def _filtered(self, given: _Given, state: InnovationState,
                   ) -> tuple[list[Signal], Surroundings, InnovationState]:
@@ -305,11 +324,13 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         innovations = passes.find_innovations(
             signals, chosen, sample, plane, motion, records, around,
             *self._reprojection_parameters(stencil), lobes,
-            at_rest_between(previous, frame, stencil) if layout.has_texture else None)
+            at_rest_between(previous, frame, stencil) if layout.has_texture else None,
+            Vector3(*(stencil.opaque(ratio) for ratio in given.change.ratio)))
         innovations = passes.choose_histories(innovations, plane)
         smoothed = passes.smooth_innovations(innovations, plane)
         merged = passes.merge(signals, innovations, chosen, smoothed, plane,
-                              self._gains(stencil, layout, moving_lights))
+                              self._gains(given, stencil, moving_lights,
+                                          bool(at_rest(previous, frame).all())))
         output = passes.filter_output(merged, innovations, plane, self._sigmas(stencil, layout),
                                       narrower)
         records = passes.pack(sample, History(merged.lengths, merged.signals),
@@ -349,7 +370,10 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         return (tests, stencil.opaque(self.max_history_length),
                 stencil.opaque(LOG2E / (2 * self.penumbra**2)))
 
-    def _gains(self, stencil: Stencil, layout: SignalLayout, moving_lights: float) -> Gains:
+    def _gains(self, given: _Given, stencil: Stencil, moving_lights: float,
+               is_still: bool) -> Gains:
+        """is_still: nothing has moved."""
+        layout, lights = given.layout, given.change
         alphas = layout.each(self.light_alpha, self.visibility_alpha)
         change = {SignalKind.DIFFUSE: self.light_change, SignalKind.GLOSSY: self.glossy_change,
                   SignalKind.VISIBILITY: self.visibility_change}
@@ -358,15 +382,19 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         is_quick = (SignalKind.DIFFUSE in layout.kinds and not layout.has_texture
                     and SignalKind.VISIBILITY not in layout.kinds)
         m = 1 if is_quick else min(2 * moving_lights, 1)
-        sharp = self.sharp_min_gain
+        rests, sharp = lights.rests and m == 0, self.sharp_min_gain
+        gain = self.min_gain * (_IN_STILL_WORLD if rests and is_still else 1)
+        threshold = self.noise_threshold * (1 - m / 2)
+        doubts = Doubts(stencil.opaque(threshold * (_LIGHTS_AT_REST if rests else 1)),
+                        stencil.opaque(threshold),
+                        [stencil.opaque(change[kind]) for kind in layout.kinds],
+                        stencil.opaque(lights.sudden))
         return Gains([stencil.opaque(alpha) for alpha in alphas],
-                     stencil.opaque(self.min_gain + m * (1 - self.min_gain)),
+                     stencil.opaque(gain + m * (1 - gain)),
                      stencil.opaque(self.expected_change / max(1 - m, _LEAST_SHARE)),
-                     stencil.opaque(self.noise_threshold * (1 - m / 2)),
                      stencil.opaque(sharp + m * max(_UNDER_MOVING_LIGHTS - sharp, 0)),
                      stencil.opaque(self.glossy_gain), stencil.opaque(self.change_alpha),
-                     stencil.opaque(self.fade_frames),
-                     [stencil.opaque(change[kind]) for kind in layout.kinds])
+                     stencil.opaque(self.fade_frames), doubts)
 
     def _sigmas(self, stencil: Stencil, layout: SignalLayout) -> list[Float]:
         """As the exponents of the last filter want them."""

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from onespp.denoise.inputs.color import read_color
+from onespp.denoise.inputs.light_change import LightChange, light_change, sample_light
 from onespp.denoise.inputs.signals import USED, read_signals
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.methods import base as lanes
+from onespp.denoise.methods.filtered_innovation import method as innovation
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
 from onespp.denoise.oracles import filtered_innovation as innovation_oracle
 from onespp.render.errors import InputError
@@ -107,9 +110,10 @@ def with_leaves(frame, seed=0):
                        normal=np.where(leaves, normal, frame["normal"]))
 
 
-def split(height, width, count=3, lobes=True, layers=False, still=False):
+def split(height, width, count=3, lobes=True, layers=False, still=False, lamp=None):
     """Moving frames, or still ones, with all channels that the method uses, but for those of
-    layers unless asked for, a lamp, and three objects; moving ones with a part that is black."""
+    layers unless asked for, a lamp, and three objects; moving ones with a part that is black.
+    lamp: its colour, or else another one in every frame."""
     frames = []
     for i, frame in enumerate(moving(height, width, 1) * count if still else
                               moving(height, width, count)):
@@ -118,7 +122,8 @@ def split(height, width, count=3, lobes=True, layers=False, still=False):
         albedo = frame["albedo"].copy()
         if not still:
             albedo[:height // 3, :width // 4] = 0
-        unshadowed = np.where(there, albedo * [1.0, 0.8, 0.6] * rng.uniform(0.5, 1, (1, 1, 3)), 0)
+        color = [1.0, 0.8, 0.6] * rng.uniform(0.5, 1, (1, 1, 3))
+        unshadowed = np.where(there, albedo * (color if lamp is None else lamp), 0)
         visibility = (rng.random((height, width)) < 0.6) * rng.gamma(4, 0.3, (height, width))
         direct = unshadowed * visibility[..., None] * rng.uniform(0.9, 1.1, (1, 1, 3))
         if still:  # (noise of its own)
@@ -201,6 +206,56 @@ def test_it_is_the_formula_in_float64(height, width, levels, sharp_levels, shado
     image, _ = run(method, frames)
     expected = innovation_oracle.run(frames, method)
     np.testing.assert_allclose(image, expected, rtol=1e-3, atol=5e-5)
+
+
+@pytest.mark.parametrize("still", [True, False])
+def test_it_is_the_formula_where_lights_are_as_they_were(still):
+    frames = split(19, 26, 4, lobes=False, still=still, lamp=[0.7, 0.6, 0.5])
+    assert all(light_change(sample_light(one), one, other).rests
+               for one, other in pairwise(frames))
+    method = FilteredInnovation(noise_threshold=0.5)  # so that some changes are believed
+    image, _ = run(method, frames)
+    np.testing.assert_allclose(image, innovation_oracle.run(frames, method), rtol=1e-3, atol=5e-5)
+
+
+def test_a_lamp_that_dims_takes_its_history_along(monkeypatch):
+    """In noise that hides such a change from its innovation, and in three colours."""
+    frames = split(32, 40, 8, lobes=False, still=True, lamp=[0.7, 0.6, 0.5])
+    factor = np.array([0.3, 0.6, 1.5])
+
+    def shown(i, frame):
+        noise = np.random.default_rng(i).gamma(0.1, 10, (32, 40, 1))
+        now = factor if i == 7 else np.ones(3)
+        light = np.where((frame["id"] >= 0)[..., None], 0.05 * now, 0)
+        direct = now * frame["unshadowed"]
+        images = {"indirect": light * noise, "direct": direct, "specular": 0 * direct}
+        return with_images(
+            frame, unshadowed=direct, visibility=np.ones((32, 40)),
+            blocker_distance=np.zeros((32, 40)),
+            color=frame["emission"] + direct + images["indirect"], **images), light
+
+    shown_, lights = zip(*(shown(i, frame) for i, frame in enumerate(frames)))
+    last, errors = shown_[-1], []
+    for told in (True, False):
+        if not told:
+            monkeypatch.setattr(innovation, "light_change", lambda *_: LightChange())
+        image, _ = run(FilteredInnovation(), shown_)
+        image = image - last["emission"] - last["direct"] - lights[-1]
+        errors.append(np.sqrt(np.square(image[last["id"] >= 0]).mean(0)) / (0.05 * factor))
+    assert (errors[0] < 0.95 * errors[1]).all()
+    assert errors[0][0] < 0.5 * errors[1][0]
+
+
+def test_metal_takes_no_diffuse_light_from_its_surroundings():
+    """The wall's right half has no diffuse lobe, and all of the light goes off."""
+    frames = split(24, 32, 5, still=True, lamp=[0.7, 0.6, 0.5])
+    off = ("direct", "indirect", "unshadowed", "specular")
+    frames[-1] = with_images(frames[-1], color=frames[-1]["emission"],
+                             **{name: 0 * frames[-1][name] for name in off})
+    image, _ = run(FilteredInnovation(), frames)
+    bare = (frames[-1]["albedo"] >= 1).all(-1) & (frames[-1]["roughness"] < 1)
+    assert bare.sum() > 100
+    np.testing.assert_allclose(image[bare], frames[-1]["emission"][bare], rtol=1e-3, atol=0.02)
 
 
 @pytest.mark.parametrize("apart", [0.0, 0.05])
@@ -393,7 +448,7 @@ def test_history_lowers_the_error_of_a_still_scene_below_that_of_single_frames()
 
 
 def test_energy_is_kept():
-    frames = split(33, 41, 4, lobes=False)  # narrow lobes lose some
+    frames = split(33, 41, 4, lobes=False, lamp=[0.7, 0.6, 0.5])  # narrow lobes lose some
     image, _ = run(FilteredInnovation(), frames)
     assert image.mean() == pytest.approx(frames[-1]["color"].mean(), rel=0.01)
 

@@ -1,5 +1,6 @@
 """Laws that every denoising method keeps, checked over the one table of methods."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,9 +9,12 @@ import pytest
 from onespp.denoise.catalog import METHODS, build, parameters
 from onespp.denoise.inputs import repair as repair_module
 from onespp.denoise.inputs.repair import repair
+from onespp.render.channels import CHANNELS
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from tests.support.frames import make_frame, noisy, translation, with_images
+
+from .test_filtered_innovation import split
 
 # Small windows keep these quick; the formulas are tested with the defaults elsewhere.
 SMALL = {"gaussian": {"radius": "4"}, "gaussian-separable": {"radius": "4"},
@@ -139,6 +143,23 @@ def test_broken_guides_give_finite_output(name, channel, value):
         result = run(name, frame, broken, broken)
         assert np.isfinite(result).all()
         assert result.max() <= 10 * frame["color"].max()
+
+
+@each_method
+@pytest.mark.parametrize("gone", [0, 1])
+def test_an_object_that_vanishes_and_comes_back_leaves_images_finite(name, gone):
+    """Shrunk to a point, as is usual; with glossy light and shadow rays, and background in view."""
+    frames = split(16, 20, 4)
+    for i in (1, 2):
+        matrices, is_gone = frames[i].world_from_object.copy(), frames[i]["id"] == gone
+        matrices[gone, :3, :3] = 0
+        images = {channel: np.where(is_gone if image.ndim == 2 else is_gone[..., None],
+                                    CHANNELS[channel].background, image)
+                  for channel, image in frames[i].images.items()}
+        frames[i] = replace(with_images(frames[i], **images), world_from_object=matrices)
+        assert (images["id"] < 0).any()
+    for some in (frames[:2], frames[:3], frames, frames[1:]):
+        assert np.isfinite(run(name, *some)).all()
 
 
 @each_method

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from onespp.denoise.inputs.light_change import LightChange
 from onespp.denoise.methods.filtered_innovation import method as innovation
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
 from onespp.denoise.metrics.errors import psnr
@@ -15,7 +16,7 @@ from onespp.denoise.studies.hard_scenes import run, run_alone
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.animation import Animation
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
-from onespp.scenes.materials import diffuse
+from onespp.scenes.materials import diffuse, metal
 from onespp.scenes.transforms import look_at, rotate, scale, translate
 
 HEIGHT, WIDTH, EVENT, SPP = 48, 72, 4, 256
@@ -68,6 +69,28 @@ def test_the_frame_after_a_change_is_at_most_1_db_behind_single_frames(make):
     assert with_history > alone - 1
     late, _ = decibels(light_change=0, visibility_change=0)
     assert late < alone - 2
+
+
+def test_glossy_light_goes_with_lamps_that_change_colour(monkeypatch):
+    white, blue = (24.0, 22.0, 20.0), (5.0, 11.0, 26.0)
+    metal_floor = Shape("metal", Rectangle(), metal((0.8, 0.8, 0.8), 0.1),
+                        translate((0, 0.01, 0)) @ rotate(_X, -90) @ scale((3, 3, 1)))
+    renderer = Renderer(_scene(metal_floor, _lamp("one", 0.3, lambda f: blue if f == EVENT
+                                                  else white)),
+                        HEIGHT, WIDTH, direct="resampled", sampler="zsobol")
+    frames = [renderer.frame(i, channels=renderer.channels) for i in range(EVENT + 1)]
+    truth = srgb_from_linear(renderer.sample_sum(EVENT, 1, 0, SPP) / SPP)
+    method: Any = FilteredInnovation()
+
+    def decibels(images):
+        return psnr(srgb_from_linear(np.maximum(images[-1], 0)), truth)
+
+    alone = decibels(run_alone(method, frames[-1:], method.init(HEIGHT, WIDTH)))
+    known = decibels(run(method, frames, method.init(HEIGHT, WIDTH)))
+    monkeypatch.setattr(innovation, "light_change", lambda *_: LightChange())
+    unknown = decibels(run(method, frames, method.init(HEIGHT, WIDTH)))
+    assert known > alone + 1
+    assert known > unknown + 3
 
 
 def test_under_a_lamp_that_moves_history_is_no_worse_than_none(monkeypatch):

@@ -1,0 +1,154 @@
+"""How the lights have changed since the frame before, which unshadowed light tells without noise.
+
+Symbols: U unshadowed light over albedo, at places of objects at rest that two frames see; ' the
+former of the two; l luminance.
+
+    ratio = median of U / U', of each colour channel; a place counts by the greater of the two
+    left = sum |l(U) - l(ratio U')| / sum max(l(U), l(ratio U'))
+
+Where all lights have changed alike, as where there is one, `left` is nearly 0, and all that they
+send, by way of surfaces and mirrors too, has changed by `ratio`: histories go with it. Where that
+leaves more than two fifths of the change it is 1, and so it is where that is within 1 %, as far as
+places are found again to a pixel. Unshadowed light tells of lights behind walls, too: nothing is
+known where direct light D, with its shadows and its noise, has changed by another ratio of sums
+than U has, by more than a third.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from onespp.denoise.geometry.cameras import camera_points, every
+from onespp.denoise.geometry.motion import at_rest
+from onespp.render.frame import Frame
+
+LARGEST_RATIO = 8.0
+_PLACES = 512              # that are looked at
+_FEWEST = 32               # that say something
+_SMALLEST_ALBEDO = 0.05
+_NEAR = 0.02               # share of the depth by which a place may be missed
+_SAME = 0.01               # ratio - 1 that is none
+_UNEXPLAINED = 0.4         # share of the change that a ratio may leave
+_DIFFERENT = 4 / 3         # times a gain, which is another one
+_RESTS = 0.05              # `left` of lights that have not changed
+_SUDDEN = 0.2              # `left` that a smoothed innovation keeps up with
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+class LightSample(NamedTuple):
+    """Places that a frame sees: (n, 3) in world space, (n,) their objects, and (2, n, 3) U and D,
+    both over albedo."""
+
+    point: np.ndarray
+    id: np.ndarray
+    light: np.ndarray
+
+
+class LightChange(NamedTuple):
+    """`ratio` of red, green and blue, and `left`, None where it is not known; see above."""
+
+    ratio: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    left: float | None = None
+
+    @property
+    def rests(self) -> bool:
+        """Whether lights are known to be as they were."""
+        return self.ratio == (1.0, 1.0, 1.0) and self.left is not None and self.left < _RESTS
+
+    @property
+    def sudden(self) -> float:
+        """How much of the light has changed, from 0, what can be followed, to 1, all of it."""
+        return max((self.left or 0.0) - _SUDDEN, 0.0) / (1 - _SUDDEN)
+
+
+def sample_light(frame: Frame) -> LightSample:
+    """What is kept of a frame with unshadowed and direct light for `light_change`."""
+    some = every(frame, _PLACES)
+    id_, points = frame["id"][some, some], camera_points(frame, some)
+    seen = (id_ >= 0) & (id_ < len(frame.world_from_object)) & np.isfinite(points).all(-1)
+    world = np.linalg.inv(frame.camera_from_world)
+    row, column = np.nonzero(seen)
+    first, step = some.start, some.step
+    return LightSample(points[seen] @ world[:3, :3].T + world[:3, 3], id_[seen].astype(int),
+                       _light(frame, first + step * row, first + step * column))
+
+
+def light_change(before: LightSample | None, previous: Frame, frame: Frame) -> LightChange:
+    """The change since the frame before.
+
+    Args:
+        before: of the frame before, None without one. previous: its matrices.
+        frame: with unshadowed and direct light.
+    """
+    if before is None or len(before.id) < _FEWEST:
+        return LightChange()
+    rests = at_rest(previous, frame)
+    screen = before.point @ frame.screen_from_world[:, :3].T + frame.screen_from_world[:, 3]
+    with np.errstate(all="ignore"):
+        depth = screen[:, 3]
+        column, row = np.floor(screen[:, 0] / depth), np.floor(screen[:, 1] / depth)
+        seen = ((depth > 0) & (column >= 0) & (column < frame.width) & (row >= 0)
+                & (row < frame.height) & (before.id < len(rests)))
+    seen[seen] = rests[before.id[seen]]
+    row, column, depth = row[seen].astype(int), column[seen].astype(int), depth[seen]
+    same = ((frame["id"][row, column] == before.id[seen])
+            & (np.abs(frame["depth"][row, column] - depth) < _NEAR * depth))
+    old, new = before.light[:, seen][:, same], _light(frame, row[same], column[same])
+    known = (np.isfinite(old) & np.isfinite(new)).all((0, 2))
+    if known.sum() < _FEWEST:
+        return LightChange()
+    (old, direct_before), (new, direct) = old[:, known], new[:, known]
+    if _apart(_gain(old, new), _gain(direct_before, direct)):
+        return LightChange()
+    return _change(old, new)
+
+
+def _light(frame: Frame, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+    """(2, n, 3) U and D of pixels, over albedo."""
+    light = np.stack([frame[name][row, column] for name in ("unshadowed", "direct")])
+    light = np.maximum(light.astype(np.float64), 0)
+    if "albedo" not in frame:
+        return light
+    return light / np.maximum(frame["albedo"][row, column], _SMALLEST_ALBEDO)
+
+
+def _change(old: np.ndarray, new: np.ndarray) -> LightChange:
+    """Of (n, 3) U' and U."""
+    weight, without = np.maximum(old, new), _left(old, new)
+    if not weight.max() > 0:
+        return LightChange()
+    if without < _SAME:
+        return LightChange(left=without)
+    each = new / np.maximum(old, 1e-6 * weight.max())
+    ratio = np.clip([_median(*both) for both in zip(each.T, weight.T, strict=True)],
+                    1 / LARGEST_RATIO, LARGEST_RATIO)
+    left = _left(old * ratio, new)
+    if (np.abs(ratio - 1) < _SAME).all() or left > _UNEXPLAINED * without:
+        return LightChange(left=without)
+    red, green, blue = ratio.tolist()
+    return LightChange((red, green, blue), left)
+
+
+def _gain(old: np.ndarray, new: np.ndarray) -> float:
+    a, b = (float((light @ _LUMINANCE).sum()) for light in (old, new))
+    return b / a if a > 0 else 1.0
+
+
+def _apart(one: float, other: float) -> bool:
+    """Whether gains differ by more than a third; anything is little beyond `LARGEST_RATIO`."""
+    one, other = (min(max(gain, 1 / LARGEST_RATIO), LARGEST_RATIO) for gain in (one, other))
+    return max(one, other) > _DIFFERENT * min(one, other)
+
+
+def _left(old: np.ndarray, new: np.ndarray) -> float:
+    a, b = old @ _LUMINANCE, new @ _LUMINANCE
+    return float(np.abs(a - b).sum() / max(np.maximum(a, b).sum(), 1e-300))
+
+
+def _median(values: np.ndarray, weights: np.ndarray) -> float:
+    """Weighted; 1 without weights."""
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    return float(values[order[np.searchsorted(total, total[-1] / 2)]]) if total[-1] > 0 else 1.0
