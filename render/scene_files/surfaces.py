@@ -96,15 +96,20 @@ def _without_images(value: Mapping[str, Any]) -> dict[str, Any]:
 def emitted(value: Any, surfaces: Surfaces, node: Node) -> Any:
     """What an emitter radiates: a colour, or the dictionary of a texture that varies.
 
+    A number is white; a spectrum of one value is not: equal energy at all wavelengths is reddish.
+
     Args:
         value: of the emitter's property; None where it has none.
     """
     if isinstance(value, tuple):
         return value
-    if isinstance(value, int | float):
-        value = {"type": "spectrum", "value": float(value)}
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return (float(value),) * 3
     if isinstance(value, Node):
         value = surfaces.texture(value)
+    if not isinstance(value, Mapping | None):
+        raise node.error(f"what this {node.plugin} radiates is {validity.brief(value)}: use a "
+                         "number, an rgb, a spectrum or a texture")
     if value is not None and value["type"] == "bitmap":
         return value
     try:

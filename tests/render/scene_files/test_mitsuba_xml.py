@@ -100,6 +100,25 @@ def test_lights_without_a_surface_give_the_same_pixels(light: str, tmp_path: Pat
     np.testing.assert_allclose(ours.mean((0, 1)), theirs.mean((0, 1)), rtol=5e-3)
 
 
+def test_a_number_is_white_whatever_it_is_the_light_of(tmp_path: Path):
+    path = written(tmp_path, scene_xml(
+        GROUND + BALL + '<shape type="sphere" id="lamp"><point name="center" value="1, 2, 1"/>'
+        '<float name="radius" value="0.3"/><emitter type="area"><float name="radiance" value="3"/>'
+        '</emitter></shape><emitter type="constant"><float name="radiance" value="0.1"/></emitter>'
+        '<emitter type="point"><point name="position" value="-1, 2, 1"/>'
+        '<integer name="intensity" value="1"/></emitter>'
+        '<emitter type="spot"><float name="intensity" value="1.5"/></emitter>'
+        '<emitter type="directional"><vector name="direction" value="-1, -2, -1"/>'
+        '<float name="irradiance" value="0.2"/></emitter>'))
+    theirs, ours = means(path, 64)
+    np.testing.assert_allclose(theirs.mean(0), theirs.mean(), rtol=1e-3)
+    brightness.assert_as_bright(theirs, ours)
+    scene = load_xml(path).scene
+    assert [scene.environment, scene.shapes[2].emission] == [(0.1,) * 3, (3.0,) * 3]
+    assert [light.emitter["intensity" if i < 2 else "irradiance"]
+            for i, light in enumerate(scene.lights)] == [(1.0,) * 3, (1.5,) * 3, (0.2,) * 3]
+
+
 def test_a_sky_with_a_sun_is_as_bright_as_mitsubas(tmp_path: Path):
     theirs, ours = means(written(tmp_path, scene_xml(
         GROUND + BALL + '<emitter type="sunsky"><float name="turbidity" value="4"/>'
@@ -329,6 +348,8 @@ SHAPE = '<shape type="{}">{}</shape>' + SKY
     (scene_xml(SKY), "there are no shapes"),
     (scene_xml(BALL), "has no light"),
     (scene_xml(BALL + SKY + SKY), "there is another environment"),
+    (scene_xml(BALL + '<emitter type="constant"><string name="radiance" value="3"/></emitter>'),
+     "what this constant radiates is '3': use a number, an rgb, a spectrum or a texture"),
     (scene_xml(BALL + '<emitter type="projector"/>'), "an emitter of type 'projector' cannot be"),
     ('<scene version="3.0.0">' + BALL + SKY + "</scene>", "there is no camera: add a <sensor>"),
     (scene_xml(BALL + SKY).replace('"perspective"', '"orthographic"'), "of type 'orthographic'"),
