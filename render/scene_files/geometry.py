@@ -1,10 +1,11 @@
 """Shapes of a Mitsuba file: meshes as arrays, read by Mitsuba; spheres and the like by name.
 
-Symbols: to_world, a shape's transform in the file; M, the transform of the group that it is in.
+Symbols: A, what a shape's own `to_world` does to directions, (3, 3); N, a normal after A.
 
-Mitsuba's mesh is flat-shaded where the file or the option `face_normals` says so. A flat mesh under
-a transform that mirrors faces the other way there (its normal follows the order of vertices), so
-its faces are turned round here, where a mirrored mesh keeps its outside.
+Mitsuba applies a shape's own transform to its vertices, and an instance's to what a ray has hit. So
+normals that a file does not have follow from the order of vertices, and from angles, after A: an A
+that mirrors turns them inward. An instance that mirrors keeps the outside of what is in it, and so
+do all transforms here; hence faces are turned round where A mirrors, and normals are A^T N.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,6 +40,7 @@ _FILES = {"obj": ("face_normals", "flip_normals", "flip_tex_coords"),
 _ANALYTIC = {"sphere": ("center", "radius"), "rectangle": (), "disk": (),
              "cylinder": ("p0", "p1", "radius")}
 _UNROUND = 1e-5
+_AS_IT_IS, _MIRRORED = np.eye(3), np.diag([-1.0, 1, 1])
 _KNOWN = (*_FILES, *_ANALYTIC, "instance", "merge")
 
 
@@ -51,11 +53,19 @@ class Piece:
     world_from_object: np.ndarray
 
 
+class _File(NamedTuple):
+    """A mesh as a file and its options give it. flipped: it faces the other way."""
+
+    plugin: str
+    options: tuple[tuple[str, Any], ...]
+    flipped: bool = False
+
+
 class Geometries:
     """Reads shapes; a file's mesh is read once for each way in which it is used."""
 
     def __init__(self) -> None:
-        self._meshes: dict[tuple[Any, ...], Mesh] = {}
+        self._meshes: dict[tuple[_File, bytes], Mesh] = {}
 
     def pieces(self, node: Node, above: np.ndarray | None = None) -> Iterator[Piece]:
         """A shape, or those in it, each with its place in the world.
@@ -72,14 +82,10 @@ class Geometries:
         if node.plugin in ("instance", "merge"):
             yield from self._inner(node, above)
             return
-        world = above @ node.matrix()
         if node.plugin in _FILES:
-            mesh = self._mesh(node)
-            if mesh.normals is None and np.linalg.det(world[:3, :3]) < 0:
-                mesh = Mesh(mesh.vertices, mesh.faces[:, ::-1], None, mesh.uv)
-            yield Piece(node, mesh, world)
+            yield Piece(node, self._mesh(node), above @ node.matrix())
         elif node.plugin in _ANALYTIC:
-            yield Piece(node, *_analytic(node, world))
+            yield Piece(node, *_analytic(node, above))
         else:
             raise node.error(f"a shape of type '{node.plugin}' cannot be rendered here: there are "
                              f"{', '.join(_KNOWN)}")
@@ -91,7 +97,7 @@ class Geometries:
         if node.plugin == "instance":
             if [part.plugin for part in inner] != ["shapegroup"]:
                 raise node.error("an instance needs one shapegroup: refer to it by its id")
-            world, inner = world @ inner[0].matrix(), inner[0].parts("shape")
+            inner = inner[0].parts("shape")
         for part in inner:
             yield from self.pieces(part, world)
 
@@ -101,13 +107,30 @@ class Geometries:
         flipped = options.pop("flip_normals", False)
         if node.plugin != "cube":
             options["filename"] = str(node.path())
-        key = (node.plugin, flipped, *options.items())
+        file = _File(node.plugin, tuple(options.items()), bool(flipped))
+        try:
+            return self._made(file, self._turn(file, node.matrix()[:3, :3]))
+        except (RuntimeError, SceneError) as error:
+            raise node.error(f"this {node.plugin} cannot be used: {plain(error)}") from None
+
+    def _made(self, file: _File, turn: np.ndarray) -> Mesh:
+        key = file, turn.tobytes()
         if key not in self._meshes:
-            try:
-                self._meshes[key] = _read(node.plugin, options, bool(flipped))
-            except (RuntimeError, SceneError) as error:
-                raise node.error(f"this {node.plugin} cannot be used: {plain(error)}") from None
+            self._meshes[key] = _read(file, turn)
         return self._meshes[key]
+
+    def _turn(self, file: _File, linear: np.ndarray) -> np.ndarray:
+        """What of A, `linear`, its normals depend on: nothing where the file has them."""
+        normals, determinant = self._made(file, _AS_IT_IS).normals, np.linalg.det(linear)
+        mirror = _MIRRORED if determinant < 0 else _AS_IT_IS
+        if normals is None or not determinant:
+            return mirror
+        turn = mirror if _is_round(linear) else linear / abs(linear).max()
+        if turn is _AS_IT_IS:
+            return turn
+        mirrored = self._made(file, _MIRRORED).normals
+        assert mirrored is not None
+        return _AS_IT_IS if np.sum(normals * mirrored) > 0 else turn
 
 
 def mesh_of_file(path: Path) -> Mesh:
@@ -117,13 +140,17 @@ def mesh_of_file(path: Path) -> Mesh:
         SceneError: it cannot be read, or is no mesh.
     """
     try:
-        return _read(path.suffix.lower()[1:], {"filename": str(path)}, False)
+        return _read(_File(path.suffix.lower()[1:], (("filename", str(path)),)), _AS_IT_IS)
     except (RuntimeError, SceneError) as error:
         raise SceneError(f"{path} cannot be used as a mesh: {plain(error)}") from None
 
 
-def _read(plugin: str, options: dict[str, Any], flipped: bool) -> Mesh:
-    mesh = mi.load_dict({"type": plugin, **options})
+def _read(file: _File, turn: np.ndarray) -> Mesh:
+    """A mesh in object space, with its normals as Mitsuba has them where A is `turn`."""
+    place = np.eye(4)
+    place[:3, :3] = turn
+    mesh = mi.load_dict({"type": file.plugin, **dict(file.options),
+                         "to_world": mi.ScalarTransform4f(place.tolist())})
     arrays = mi.traverse(mesh)
 
     def rows(name: str, width: int) -> np.ndarray:
@@ -135,9 +162,10 @@ def _read(plugin: str, options: dict[str, Any], flipped: bool) -> Mesh:
     if uv is not None:
         uv = np.where(np.isfinite(uv), uv, 0)
     if normals is not None:
-        normals = with_lengths(normals, vertices, faces)
-        normals = -normals if flipped else normals
-    return Mesh(vertices, faces[:, ::-1] if flipped else faces, normals, uv)
+        normals = with_lengths(normals, vertices, faces) @ turn
+        normals = -normals if file.flipped else normals
+    turned = file.flipped ^ bool(np.linalg.det(turn) < 0)
+    return Mesh(vertices @ np.linalg.inv(turn).T, faces[:, ::-1] if turned else faces, normals, uv)
 
 
 def with_lengths(normals: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -153,7 +181,9 @@ def with_lengths(normals: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -
     return np.where(bad[:, None], around / np.linalg.norm(around, axis=1, keepdims=True), normals)
 
 
-def _analytic(node: Node, world: np.ndarray) -> tuple[Geometry, np.ndarray]:
+def _analytic(node: Node, above: np.ndarray) -> tuple[Geometry, np.ndarray]:
+    """A shape that renderers know by name, and its place; `above`, where its instance is."""
+    world = above @ node.matrix()
     node.check_names("to_world", "flip_normals", *_ANALYTIC[node.plugin])
     flipped = bool(node.values.get("flip_normals", False))
     if not np.linalg.det(world[:3, :3]):
@@ -168,9 +198,10 @@ def _analytic(node: Node, world: np.ndarray) -> tuple[Geometry, np.ndarray]:
         raise node.error(f"the radius of this {node.plugin} is {radius:g}: use more than 0")
     if node.plugin == "sphere":
         world = world @ translate(node.triple("center", "point", (0, 0, 0))) @ scale(radius)
+        flipped ^= bool(np.linalg.det(node.matrix()[:3, :3]) < 0)
         if _is_round(world[:3, :3]):
             mirrored = np.linalg.det(world[:3, :3]) < 0
-            return Sphere(flipped ^ bool(mirrored)), world @ scale((-1 if mirrored else 1, 1, 1))
+            return Sphere(flipped), world @ scale((-1 if mirrored else 1, 1, 1))
         ball = meshes.ellipsoid((1, 1, 1), 96)
         return _turned(meshes.place(ball, _Z_UP), flipped), world
     start, end = node.triple("p0", "point", (0, 0, 0)), node.triple("p1", "point", (0, 0, 1))

@@ -179,6 +179,12 @@ def _shape(name: str, piece: Piece, surfaces: Surfaces) -> Shape:
         raise (error if text.startswith("scene file") else node.error(text)) from None
 
 
+def _groups(root: Node) -> list[Node]:
+    """Groups of shapes, each once, whether they stand alone or in their instances."""
+    found = [node for shape in root.parts("shape") for node in (shape, *shape.parts("shape"))]
+    return list(dict.fromkeys(node for node in found if node.plugin == "shapegroup"))
+
+
 def _unused(root: Node, camera: Node, integrator: Node | None) -> list[str]:
     """What of the file is not used, in words."""
     said = []
@@ -195,6 +201,8 @@ def _unused(root: Node, camera: Node, integrator: Node | None) -> list[str]:
         hidden = " (lamps show: 'hide_emitters' too)" if integrator.values.get(
             "hide_emitters") else ""
         said.append(f"the integrator '{integrator.plugin}' but for its depth{hidden}")
+    said += [f"the transform of the shapegroup '{group.id}'"
+             for group in _groups(root) if "to_world" in group.values]
     others = len(root.parts("sensor")) - 1
     if others:
         said.append(f"{others} other sensor{'s' * (others > 1)}")

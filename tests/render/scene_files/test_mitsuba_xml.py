@@ -14,6 +14,7 @@ from onespp.render.files.sequence import FrameSequence
 from onespp.render.mitsuba import pictured_lamps
 from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
+from onespp.render.scene_files.extent import bounds
 from onespp.render.scene_files.mitsuba_xml import load_xml
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.animation import spin
@@ -217,24 +218,37 @@ SHAPES = {
     "cylinder": '<point name="p0" value="0, -0.5, 0"/><point name="p1" value="0.3, 1.5, 0"/>'
                 '<float name="radius" value="0.4"/>',
     "obj": '<string name="filename" value="a.obj"/>',
+    "obj without normals": '<string name="filename" value="bare.obj"/>',
+    "ply without normals": '<string name="filename" value="a.ply"/>',
     "ply": '<string name="filename" value="a.ply"/><boolean name="face_normals" value="true"/>'}
+BARE = ("obj without normals", "ply without normals", "ply")
+TURNED = "<rotate x='1' angle='40'/><rotate z='1' angle='20'/>"
+MIRRORED = "<scale x='-1'/><rotate y='1' angle='30'/>"
+REFLECTED = "<scale x='-1'/><rotate z='1' angle='25'/>"
+STRETCHED = "<scale x='1.5' y='-0.7' z='0.5'/><rotate x='1' angle='30'/>"
 
 
 @pytest.mark.parametrize("flip", ["false", "true"])
-@pytest.mark.parametrize("turn", ["<rotate x='1' angle='40'/><rotate z='1' angle='20'/>",
-                                  "<scale x='-1'/><rotate y='1' angle='30'/>"])
-@pytest.mark.parametrize("plugin", SHAPES)
-def test_shapes_are_where_mitsubas_are_and_face_as_they_do(plugin: str, turn: str, flip: str,
-                                                           tmp_path: Path):
+@pytest.mark.parametrize(("plugin", "turn", "instance"), [
+    *((plugin, *turns) for plugin in SHAPES for turns in (
+        (TURNED, ""), (MIRRORED, ""), (TURNED, REFLECTED), (MIRRORED, REFLECTED))),
+    *((plugin, STRETCHED, "") for plugin in ("cube", "obj", *BARE))])
+def test_shapes_are_where_mitsubas_are_and_face_as_they_do(
+        plugin: str, turn: str, instance: str, flip: str, tmp_path: Path):
     from onespp.scenes import meshes
     from tests.support.xml_scenes import write_obj, write_ply
 
     mesh = meshes.torus(0.8, 0.4, 12)
     write_obj(tmp_path / "a.obj", mesh)
+    write_obj(tmp_path / "bare.obj", mesh, normals=False)
     write_ply(tmp_path / "a.ply", mesh)
-    path = written(tmp_path, scene_xml(
-        f'<shape type="{plugin}">{SHAPES[plugin]}<boolean name="flip_normals" value="{flip}"/>'
-        f'<transform name="to_world">{turn}<translate y="0.3"/></transform></shape>{SKY}'))
+    text = (f'<shape type="{plugin.split()[0]}">{SHAPES[plugin]}'
+            f'<boolean name="flip_normals" value="{flip}"/>'
+            f'<transform name="to_world">{turn}<translate y="0.3"/></transform></shape>')
+    if instance:
+        text = (f'<shape type="shapegroup" id="group">{text}</shape><shape type="instance">'
+                f'<transform name="to_world">{instance}</transform><ref id="group"/></shape>')
+    path = written(tmp_path, scene_xml(text + SKY))
     theirs = mi.load_file(str(path))
     stage = MitsubaScene(load_xml(path).scene)
     grid = np.stack(np.meshgrid(np.linspace(-0.4, 0.45, 5), np.linspace(-0.4, 0.3, 4)), -1)
@@ -262,6 +276,17 @@ def test_instances_and_names_and_what_is_not_used(tmp_path: Path):
                              "'independent', the integrator 'path' but for its depth")
     leaves = [s for s in loaded.scene.shapes if s.name.startswith(("left", "right"))]
     assert len({id(shape.material) for shape in leaves}) == 1
+
+
+def test_the_transform_of_a_group_counts_for_nothing_as_in_mitsuba(tmp_path: Path):
+    path = written(tmp_path, scene_xml(
+        '<shape type="shapegroup" id="g"><transform name="to_world"><translate x="5"/></transform>'
+        '<shape type="cube"/></shape><shape type="instance"><transform name="to_world">'
+        '<translate y="2"/></transform><ref id="g"/></shape>' + SKY))
+    box = mi.load_file(str(path)).bbox()
+    loaded = load_xml(path)
+    np.testing.assert_allclose(bounds(loaded.scene.shapes[0]), [box.min, box.max])
+    assert "the transform of the shapegroup 'g'" in loaded.unused
 
 
 def test_what_is_not_used_is_told_once(tmp_path: Path):
