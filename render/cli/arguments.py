@@ -32,12 +32,14 @@ def parse_settings(texts: Iterable[str], option: str = "-D", last: bool = False,
         last: a name may hold "=", a value may not. form: how to write one, for the message.
 
     Raises:
-        InputError: one has another form.
+        InputError: one has another form, or a name comes again.
     """
-    made = {}
+    made: dict[str, str] = {}
     for text in texts:
         name, equals, value = text.rpartition("=") if last else text.partition("=")
         if not (name and equals):
             raise InputError(f"{option} {text} is not understood: use {option} {form}")
+        if name in made:
+            raise InputError(f"{option} {name}=... is given twice: leave one out")
         made[name] = value
     return made

@@ -157,6 +157,7 @@ def _dictionary(value: Mapping[str, Any], place: Place,
         raise SceneError(_no_such(kind, mi.ObjectType.Texture, what))
     _survivable(value, what)
     made: dict[str, Any] = {}
+    bright: dict[str, Any] = {}  # of a lamp's file, whose pixels would be warned of as no colours
     for key, part in value.items():
         at = place.inside(key)
         if key == "bitmap":
@@ -166,7 +167,9 @@ def _dictionary(value: Mapping[str, Any], place: Place,
         elif key == "filename":
             made[key] = str(part)
             if kind == "bitmap":
-                _read(part, str(at), bounds)
+                pixels = _read(part, str(at), bounds)
+                if bounds is validity.RADIANCE and pixels.max() > 1:
+                    bright = {"bitmap": mi.Bitmap(pixels.astype(np.float32)), "raw": True}
             elif not Path(part).is_file():
                 raise SceneError(f"{at} names '{part}', and there is no such file: correct the "
                                  "path, relative ones start from the scene file's folder")
@@ -174,7 +177,9 @@ def _dictionary(value: Mapping[str, Any], place: Place,
             made[key] = [tuple(map(float, pair)) for pair in part]
         elif key != "id":  # an ID of the user's might be one of ours
             made[key] = plugin(part, at, validity.bounds_of(key, bounds))
-    return made
+    if bright:
+        del made["filename"]
+    return made | bright
 
 
 def _survivable(value: Mapping[str, Any], what: str) -> None:

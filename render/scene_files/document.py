@@ -19,6 +19,7 @@ import numpy as np
 from onespp.render.mitsuba.plugins import plain
 from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import SceneError
+from onespp.scenes.validity import LARGEST
 
 _PLACE = re.compile(r"^(?P<file>.*) \(line (?P<line>\d+), col (?P<column>\d+)\)$", re.DOTALL)
 _FAILED = re.compile(r"Error while loading (?P<place>[^\n]*? \(line \d+, col \d+\)): ")
@@ -56,11 +57,24 @@ class Node:
         return [value for value in self.values.values()
                 if isinstance(value, Node) and (not kinds or value.kind in kinds)]
 
+    def all_parts(self, kind: str) -> list[Node]:
+        """The nodes of a kind in this one, in those, and so on, each once."""
+        found: dict[Node, None] = {}
+        left = self.parts(kind)[::-1]
+        while left:
+            node = left.pop()
+            if node not in found:
+                found[node] = None
+                left += node.parts(kind)[::-1]
+        return list(found)
+
     def number(self, name: str, default: float) -> float:
         """A number of the file's."""
         value = self.values.get(name, default)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.error(f"'{name}' of this {self.plugin} is {value!r}: use a number")
+        if (isinstance(value, bool) or not isinstance(value, int | float)
+                or not abs(value) <= LARGEST):
+            raise self.error(f"'{name}' of this {self.plugin} is {value!r}: use a number of up to "
+                             f"{LARGEST:g}")
         return float(value)
 
     def matrix(self, name: str = "to_world") -> np.ndarray:
@@ -68,7 +82,7 @@ class Node:
         value = self.values.get(name)
         if value is None:
             return np.eye(4)
-        if np.shape(value) != (4, 4) or not np.isfinite(value).all():
+        if np.shape(value) != (4, 4) or not (abs(value) <= LARGEST).all():
             raise self.error(f"'{name}' of this {self.plugin} is no finite transform: correct it")
         if not np.array_equal(value[3], (0, 0, 0, 1)):
             raise self.error(f"'{name}' of this {self.plugin} is a projection: use an affine "
@@ -79,7 +93,7 @@ class Node:
                default: tuple[float, float, float] | None = None) -> np.ndarray:
         """A point or another vector of the file's, (3,) float64."""
         value = np.asarray(self.values.get(name, default), float)
-        if value.shape != (3,) or not np.isfinite(value).all():
+        if value.shape != (3,) or not (abs(value) <= LARGEST).all():
             raise self.error(f"'{name}' of this {self.plugin} is no {kind}: use x, y and z")
         return value
 

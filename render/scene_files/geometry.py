@@ -11,7 +11,7 @@ do all transforms here; hence faces are turned round where A mirrors, and normal
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,6 +39,7 @@ _FILES = {"obj": ("face_normals", "flip_normals", "flip_tex_coords"),
           "cube": ("flip_normals",)}
 _ANALYTIC = {"sphere": ("center", "radius"), "rectangle": (), "disk": (),
              "cylinder": ("p0", "p1", "radius")}
+_IGNORED = "silhouette_sampling_weight"  # of derivatives
 _UNROUND = 1e-5
 _AS_IT_IS, _MIRRORED = np.eye(3), np.diag([-1.0, 1, 1])
 _KNOWN = (*_FILES, *_ANALYTIC, "instance", "merge")
@@ -91,7 +92,7 @@ class Geometries:
                              f"{', '.join(_KNOWN)}")
 
     def _inner(self, node: Node, above: np.ndarray) -> Iterator[Piece]:
-        node.check_names("to_world")
+        node.check_names("to_world", _IGNORED)
         world = above @ node.matrix()
         inner = node.parts("shape")
         if node.plugin == "instance":
@@ -102,7 +103,7 @@ class Geometries:
             yield from self.pieces(part, world)
 
     def _mesh(self, node: Node) -> Mesh:
-        node.check_names("filename", "to_world", *_FILES[node.plugin])
+        node.check_names("filename", "to_world", _IGNORED, *_FILES[node.plugin])
         options = {name: node.values[name] for name in _FILES[node.plugin] if name in node.values}
         flipped = options.pop("flip_normals", False)
         if node.plugin != "cube":
@@ -116,7 +117,9 @@ class Geometries:
     def _made(self, file: _File, turn: np.ndarray) -> Mesh:
         key = file, turn.tobytes()
         if key not in self._meshes:
-            self._meshes[key] = _read(file, turn)
+            mesh = _read(file, turn)
+            self._meshes[key] = mesh if turn is _AS_IT_IS else replace(
+                mesh, vertices=self._made(file, _AS_IT_IS).vertices)
         return self._meshes[key]
 
     def _turn(self, file: _File, linear: np.ndarray) -> np.ndarray:
@@ -146,7 +149,7 @@ def mesh_of_file(path: Path) -> Mesh:
 
 
 def _read(file: _File, turn: np.ndarray) -> Mesh:
-    """A mesh in object space, with its normals as Mitsuba has them where A is `turn`."""
+    """A mesh as Mitsuba has it where A is `turn`, its normals back in object space."""
     place = np.eye(4)
     place[:3, :3] = turn
     mesh = mi.load_dict({"type": file.plugin, **dict(file.options),
@@ -162,10 +165,11 @@ def _read(file: _File, turn: np.ndarray) -> Mesh:
     if uv is not None:
         uv = np.where(np.isfinite(uv), uv, 0)
     if normals is not None:
-        normals = with_lengths(normals, vertices, faces) @ turn
+        normals = with_lengths(normals, vertices, faces)
+        normals = normals if turn is _AS_IT_IS else normals @ turn
         normals = -normals if file.flipped else normals
     turned = file.flipped ^ bool(np.linalg.det(turn) < 0)
-    return Mesh(vertices @ np.linalg.inv(turn).T, faces[:, ::-1] if turned else faces, normals, uv)
+    return Mesh(vertices, faces[:, ::-1] if turned else faces, normals, uv)
 
 
 def with_lengths(normals: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -184,7 +188,7 @@ def with_lengths(normals: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -
 def _analytic(node: Node, above: np.ndarray) -> tuple[Geometry, np.ndarray]:
     """A shape that renderers know by name, and its place; `above`, where its instance is."""
     world = above @ node.matrix()
-    node.check_names("to_world", "flip_normals", *_ANALYTIC[node.plugin])
+    node.check_names("to_world", "flip_normals", _IGNORED, *_ANALYTIC[node.plugin])
     flipped = bool(node.values.get("flip_normals", False))
     if not np.linalg.det(world[:3, :3]):
         raise node.error(f"this {node.plugin} is flattened by its transform: scale all its axes "

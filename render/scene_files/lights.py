@@ -32,6 +32,12 @@ def emission(shape: Node, surfaces: Surfaces) -> Any:
     return emitted(found[0].values.get("radiance"), surfaces, found[0])
 
 
+def of_scene(root: Node) -> list[Node]:
+    """The emitters of the scene itself; what a shape refers to is the shape's."""
+    referred = {part for shape in root.all_parts("shape") for part in shape.parts("emitter")}
+    return [node for node in root.parts("emitter") if node not in referred]
+
+
 def around(emitters: Sequence[Node], surfaces: Surfaces) -> Any:
     """The scene's environment, None where it has none."""
     found = [node for node in emitters if node.plugin in (*ENVIRONMENTS, "timed_sunsky")]
@@ -47,7 +53,7 @@ def around(emitters: Sequence[Node], surfaces: Surfaces) -> Any:
         raise node.error("a timed_sunsky cannot be rendered here: use a sunsky")
     if node.plugin == "envmap":
         node.check_names("filename", "scale", "to_world", "mis_compensation", _IGNORED)
-        made: dict[str, Any] = {"type": "envmap", "filename": str(node.path())}
+        made: dict[str, Any] = {"type": "envmap", "filename": surfaces.picture(node)}
         if "scale" in node.values:
             made["scale"] = node.number("scale", 1)
         if "mis_compensation" in node.values:
@@ -69,7 +75,8 @@ def points(emitters: Sequence[Node], surfaces: Surfaces) -> tuple[Light, ...]:
 
 def _point(node: Node, surfaces: Surfaces) -> Light:
     if node.plugin == "area":
-        raise node.error("an area light is of a shape: put it into one")
+        raise node.error("an area light is of a shape: put it into one, or refer to it "
+                         "there")
     if node.plugin not in LIGHTS:
         raise node.error(f"an emitter of type '{node.plugin}' cannot be rendered here: there are "
                          f"area, {', '.join((*ENVIRONMENTS, *LIGHTS))}")

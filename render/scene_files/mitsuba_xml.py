@@ -26,6 +26,7 @@ _BLACK = {"type": "diffuse", "reflectance": (0.0, 0.0, 0.0)}
 _GRAY = {"type": "diffuse", "reflectance": (0.5, 0.5, 0.5)}
 _FILM = (768, 576)
 _FULL_FRAME = np.hypot(36, 24)  # mm, what Mitsuba's focal lengths are for
+_FOCAL_LENGTH = "50mm"  # where nothing is said, as in Mitsuba
 _DIRECT_DEPTH = 2
 _SENSOR = ("to_world", "fov", "fov_axis", "focal_length", "near_clip", "far_clip",
            "principal_point_offset_x", "principal_point_offset_y", "shutter_open", "shutter_close",
@@ -51,7 +52,7 @@ def load_xml(path: Path, parameters: Mapping[str, str] | None = None, sensor: in
         raise media[0].error("media cannot be rendered here, only surfaces: leave it out")
     integrator = _integrator(root)
     surfaces = Surfaces()
-    emitters = root.parts("emitter")
+    emitters = lights.of_scene(root)
     try:
         scene = Scene(
             name=scene_name(path), about=f"A still scene of {path.name}",
@@ -104,9 +105,10 @@ def _film(node: Node) -> tuple[int, int]:
     if not films:
         return _FILM
     film = films[0]
-    if any(name.startswith("crop_") for name in film.values):
-        raise film.error("a cropped film cannot be rendered here: leave out the crop")
     width, height = (int(film.number(name, size)) for name, size in zip(("width", "height"), _FILM))
+    whole = {"crop_offset_x": 0, "crop_offset_y": 0, "crop_width": width, "crop_height": height}
+    if any(film.number(name, size) != size for name, size in whole.items()):
+        raise film.error("a cropped film cannot be rendered here: leave out the crop")
     if min(width, height) < 1:
         raise film.error(f"a film of {width}x{height} is empty: use at least 1x1")
     return width, height
@@ -114,23 +116,21 @@ def _film(node: Node) -> tuple[int, int]:
 
 def _field_of_view(node: Node, aspect: float) -> tuple[float, str]:
     """Degrees, and along what; a diagonal one becomes that along x, for the film's aspect."""
-    axis = node.values.get("fov_axis", "x")
-    if "focal_length" in node.values:
-        length = str(node.values["focal_length"]).removesuffix("mm")
+    axis = str(node.values.get("fov_axis", "x")).lower()
+    if "fov" in node.values and "focal_length" not in node.values:
+        fov = node.number("fov", 0)
+    else:
+        length = str(node.values.get("focal_length", _FOCAL_LENGTH)).removesuffix("mm")
         axis = "diagonal"
         try:
             fov = float(2 * np.degrees(np.arctan(_FULL_FRAME / 2 / float(length))))
         except (ValueError, ZeroDivisionError):
             raise node.error(f"the focal_length of this sensor is {length!r}: use millimetres, as "
                              "50mm") from None
-    elif "fov" in node.values:
-        fov = node.number("fov", 0)
-    else:
-        raise node.error("this sensor has no fov: give it one, in degrees")
     if axis == "diagonal":
         half = np.tan(np.radians(fov) / 2) / np.sqrt(1 + 1 / aspect**2)
         fov, axis = float(2 * np.degrees(np.arctan(half))), "x"
-    return fov, str(axis)
+    return fov, axis
 
 
 def _integrator(root: Node) -> Node | None:
@@ -179,12 +179,6 @@ def _shape(name: str, piece: Piece, surfaces: Surfaces) -> Shape:
         raise (error if text.startswith("scene file") else node.error(text)) from None
 
 
-def _groups(root: Node) -> list[Node]:
-    """Groups of shapes, each once, whether they stand alone or in their instances."""
-    found = [node for shape in root.parts("shape") for node in (shape, *shape.parts("shape"))]
-    return list(dict.fromkeys(node for node in found if node.plugin == "shapegroup"))
-
-
 def _unused(root: Node, camera: Node, integrator: Node | None) -> list[str]:
     """What of the file is not used, in words."""
     said = []
@@ -201,8 +195,8 @@ def _unused(root: Node, camera: Node, integrator: Node | None) -> list[str]:
         hidden = " (lamps show: 'hide_emitters' too)" if integrator.values.get(
             "hide_emitters") else ""
         said.append(f"the integrator '{integrator.plugin}' but for its depth{hidden}")
-    said += [f"the transform of the shapegroup '{group.id}'"
-             for group in _groups(root) if "to_world" in group.values]
+    said += [f"the transform of the shapegroup '{shape.id}'" for shape in root.all_parts("shape")
+             if shape.plugin == "shapegroup" and "to_world" in shape.values]
     others = len(root.parts("sensor")) - 1
     if others:
         said.append(f"{others} other sensor{'s' * (others > 1)}")

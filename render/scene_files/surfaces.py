@@ -28,6 +28,7 @@ class Surfaces:
     def __init__(self) -> None:
         self._made: dict[int, Material] = {}
         self._tried: set[Any] = set()
+        self._pictures: set[str] = set()  # which have been read
 
     def material(self, node: Node) -> Material:
         """The dictionary of a BSDF.
@@ -59,8 +60,22 @@ class Surfaces:
                                       "here: leave it out")
                 made[key.replace(".", "_")] = self._dictionary(value)
             else:
-                made[key] = str(node.path()) if key == "filename" else value
+                made[key] = value if key != "filename" else (
+                    self.picture(node) if node.plugin == "bitmap" else str(node.path()))
         return made
+
+    def picture(self, node: Node) -> str:
+        """The image file that it names, which can be read."""
+        path = str(node.path())
+        if path not in self._pictures:
+            try:
+                mi.Bitmap(path)
+            except RuntimeError as error:
+                raise node.error(f"this {node.plugin} names '{path}', which is no image that can "
+                                 f"be read ({plugins.plain(error)}): save it again as PNG, JPEG or "
+                                 "EXR") from None
+            self._pictures.add(path)
+        return path
 
     def _check(self, node: Node, material: Material) -> None:
         """Say now what is wrong with it, while it is known where; images are read later.

@@ -199,8 +199,8 @@ def test_the_light_of_a_point_in_a_tiny_scene_falls_as_in_a_large_one(tmp_path: 
 
 @pytest.mark.parametrize("sensor", [
     *(f'<float name="fov" value="50"/><string name="fov_axis" value="{axis}"/>'
-      for axis in ("x", "y", "smaller", "larger", "diagonal")),
-    '<string name="focal_length" value="35mm"/>'])
+      for axis in ("x", "y", "Y", "smaller", "larger", "diagonal")),
+    '<string name="focal_length" value="35mm"/>', ""])
 def test_each_field_of_view_is_mitsubas(sensor: str, tmp_path: Path):
     path = written(tmp_path, scene_xml(GROUND + SKY, sensor))
     theirs = mi.load_file(str(path)).sensors()[0]
@@ -289,6 +289,45 @@ def test_the_transform_of_a_group_counts_for_nothing_as_in_mitsuba(tmp_path: Pat
     assert "the transform of the shapegroup 'g'" in loaded.unused
 
 
+def test_an_area_light_may_stand_in_the_scene_and_be_referred_to(tmp_path: Path):
+    light = '<emitter type="area" id="light"><rgb name="radiance" value="4, 3, 2"/></emitter>'
+    path = written(tmp_path, scene_xml(
+        light + BALL.replace("</shape>", '<ref id="light"/></shape>')))
+    assert mi.load_file(str(path)).shapes()[0].is_emitter()
+    scene = load_xml(path).scene
+    assert (scene.shapes[0].emission, scene.lights) == ((4, 3, 2), ())
+    with pytest.raises(SceneError, match="of a shape: put it into one, or refer to it there"):
+        load_xml(written(tmp_path, scene_xml(BALL + light)))
+
+
+def test_what_changes_no_picture_is_taken_as_it_is(tmp_path: Path):
+    crop = {"crop_offset_x": 0, "crop_offset_y": 0, "crop_width": 24, "crop_height": 16}
+    whole = "".join(f'<integer name="{name}" value="{size}"/>' for name, size in crop.items())
+    weight = '<float name="silhouette_sampling_weight" value="2"/>'
+    shapes = (f'<shape type="shapegroup" id="g"><shape type="cube">{weight}</shape></shape>'
+              f'<shape type="instance">{weight}<ref id="g"/></shape>'
+              f'<shape type="sphere">{weight}</shape>')
+    mi.load_file(str(path := written(tmp_path, scene_xml(shapes + SKY).replace(
+        "<rfilter", f"{whole}<rfilter"))))
+    scene = load_xml(path).scene
+    assert (len(scene.shapes), scene.width, scene.height) == (2, 24, 16)
+
+
+def test_a_lamp_brighter_than_1_is_no_reason_to_warn(
+        tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    pixels = np.random.default_rng(1).uniform(0, 5, (4, 4, 3)).astype(np.float32)
+    mi.Bitmap(pixels).write(str(tmp_path / "lamp.exr"))
+    path = written(tmp_path, scene_xml(
+        GROUND + '<shape type="rectangle"><transform name="to_world"><translate y="1"/></transform>'
+        '<emitter type="area"><texture type="bitmap" name="radiance">'
+        '<string name="filename" value="lamp.exr"/></texture></emitter></shape>'))
+    ours = Renderer(load_xml(path).scene, 16, 24).sample_sum(0, 1, 0, 64, antialias=True) / 64
+    assert "WARN" not in "".join(capfd.readouterr())
+    theirs = np.array(mi.render(mi.load_file(str(path)), spp=64))[..., :3]
+    assert "exceed" in "".join(capfd.readouterr())
+    np.testing.assert_allclose(ours.mean((0, 1)), theirs.mean((0, 1)), rtol=0.01)
+
+
 def test_what_is_not_used_is_told_once(tmp_path: Path):
     text = scene_xml(BALL + SKY + '<medium type="homogeneous" id="fog"/>'
                      '<sensor type="perspective"><float name="fov" value="9"/></sensor>',
@@ -352,6 +391,12 @@ SHAPE = '<shape type="{}">{}</shape>' + SKY
     (scene_xml(SHAPE.format("sphere", '<bsdf type="diffuse"><texture type="bitmap" name='
                             '"reflectance"><string name="filename" value="no.png"/></texture>'
                             "</bsdf>")), r"this bitmap names '.*no.png', and there is no such"),
+    (scene_xml(SHAPE.format("sphere", '<bsdf type="diffuse"><texture type="bitmap" name='
+                            '"reflectance"><string name="filename" value="a.xml"/></texture>'
+                            "</bsdf>")), r"line 8, column \d+: this bitmap names '.*a.xml', "
+                                         r"which is no image that can be read"),
+    (scene_xml(BALL + '<emitter type="envmap"><string name="filename" value="a.xml"/></emitter>'),
+     r"line 8, column \d+: this envmap names '.*a.xml', which is no image that can be read"),
     (scene_xml(SHAPE.format("sphere", '<bsdf type="difuse"/>')),
      "no material of Mitsuba's: did you mean 'diffuse'"),
     (scene_xml(SHAPE.format("sphere", '<bsdf type="diffuse"><float name="gloss" value="1"/></bsdf>'
@@ -366,6 +411,8 @@ SHAPE = '<shape type="{}">{}</shape>' + SKY
     (scene_xml(SHAPE.format("sphere", '<float name="radus" value="1"/>')),
      "a sphere has no property 'radus' here"),
     (scene_xml(SHAPE.format("sphere", '<float name="radius" value="0"/>')), "use more than 0"),
+    (scene_xml(SHAPE.format("sphere", '<float name="radius" value="1e400"/>')),
+     r"line 8, column \d+: 'radius' of this sphere is inf: use a number of up to 1e\+30"),
     (scene_xml(SHAPE.format("rectangle", '<transform name="to_world"><scale x="0"/></transform>')),
      "flattened by its transform"),
     (scene_xml(SHAPE.format("cylinder", '<transform name="to_world"><scale x="2"/></transform>')),
@@ -379,7 +426,8 @@ SHAPE = '<shape type="{}">{}</shape>' + SKY
     ('<scene version="3.0.0">' + BALL + SKY + "</scene>", "there is no camera: add a <sensor>"),
     (scene_xml(BALL + SKY).replace('"perspective"', '"orthographic"'), "of type 'orthographic'"),
     (scene_xml(BALL + SKY, '<float name="fov" value="500"/>'), "field of view is 500.0 degrees"),
-    (scene_xml(BALL + SKY, ""), "this sensor has no fov"),
+    (scene_xml(BALL + SKY).replace("<rfilter", '<integer name="crop_width" value="12"/><rfilter'),
+     "a cropped film cannot be rendered here"),
     (scene_xml(BALL + SKY, '<float name="fov" value="50"/><float name="principal_point_offset_x" '
                'value="0.1"/>'), "principal point is off the centre"),
 ])
@@ -421,6 +469,8 @@ def test_the_command_renders_goes_on_and_refuses_in_one_line(call, tmp_path: Pat
     for wrong, sentence in (
             (words[:2], r"the parameter \$w has no value: give it one, as -D w=VALUE"),
             ((*words, "-D", "h"), "-D h is not understood: use -D NAME=VALUE"),
+            ((*words, "-D", "w=9"), "-D w=... is given twice: leave one out"),
+            ((*words, *moved, "--move", "ball=spin"), "--move ball=... is given twice"),
             ((*words, "--sensor", 1), "there is no sensor 1: use --sensor 0"),
             (("render", "box", "-D", "w=12"), "-D is for Mitsuba's XML files, and 'box' is none"),
             ((*words, "--camera", "fly"), "there is no camera move 'fly'"),
