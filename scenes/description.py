@@ -222,11 +222,13 @@ class Camera:
         fov: field of view, degrees.
         fov_axis: what it spans: "y" the picture's height, "x" its width, or whichever of the two
             is "smaller" or "larger".
+        mirrored: whether the transform may mirror, and with it the picture.
     """
 
     world_from_camera: Matrix | Motion
     fov: float = 40.0
     fov_axis: str = field(default="y", metadata=LATER)
+    mirrored: bool = field(default=False, metadata=LATER)
 
     def __post_init__(self) -> None:
         fov = validity.number(self.fov, "the camera's field of view")
@@ -236,7 +238,7 @@ class Camera:
             raise SceneError(f"the camera's fov_axis is {validity.brief(self.fov_axis)}: use "
                              f"{', '.join(FOV_AXES[:-1])} or {FOV_AXES[-1]}")
         if not callable(self.world_from_camera):
-            place = validity.rigid(self.world_from_camera, "the place of 'camera'")
+            place = validity.rigid(self.world_from_camera, "the place of 'camera'", self.mirrored)
             object.__setattr__(self, "world_from_camera", place)
 
     @property
@@ -249,7 +251,7 @@ class Camera:
         if not callable(place):
             return place
         what = f"the place of 'camera' in frame {frame:g}"
-        return validity.rigid(_called(place, frame, what), what)
+        return validity.rigid(_called(place, frame, what), what, self.mirrored)
 
     def screen_from_camera(self, height: int, width: int) -> Matrix:
         """Projection to pixels: x in [0, w), y in [0, h) down after dividing by depth.

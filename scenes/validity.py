@@ -109,11 +109,11 @@ def matrix(value: Any, what: str) -> np.ndarray:
     return found
 
 
-def rigid(value: Any, what: str) -> np.ndarray:
+def rigid(value: Any, what: str, mirrored: bool = False) -> np.ndarray:
     """A transform that only turns and moves.
 
-    Uniform scale is refused too: it would scale depths, which are world units. So is a mirror: the
-    axes were mistaken, more often than a mirrored picture is meant.
+    Uniform scale is refused too: it would scale depths, which are world units. So is a mirror, if
+    not `mirrored`: the axes were mistaken, more often than a mirrored picture is meant.
     """
     found = matrix(value, what)
     axes = found[:3, :3]
@@ -126,7 +126,7 @@ def rigid(value: Any, what: str) -> np.ndarray:
         raise SceneError(f"{what} scales its axes by {np.round(lengths, 4).tolist()}: a camera "
                          "only turns and moves, divide each of the first three columns by its "
                          "length")
-    if np.linalg.det(axes) < 0:
+    if np.linalg.det(axes) < 0 and not mirrored:
         raise SceneError(f"{what} mirrors the picture: its columns are the camera's axes, x to the "
                          "right, y down and z forward (see transforms.look_at)")
     return found

@@ -95,7 +95,7 @@ def _camera(node: Node) -> tuple[Camera, int, int]:
     matrix[:3, :3] /= lengths
     fov, axis = _field_of_view(node, width / height)
     try:
-        return Camera(matrix, fov, axis), width, height
+        return Camera(matrix, fov, axis, bool(np.linalg.det(matrix[:3, :3]) < 0)), width, height
     except SceneError as error:
         raise node.error(str(error)) from None
 

@@ -212,6 +212,26 @@ def test_each_field_of_view_is_mitsubas(sensor: str, tmp_path: Path):
     np.testing.assert_allclose((x / w, y / w), (1, 2), atol=1e-3)
 
 
+def test_a_camera_that_mirrors_shows_what_mitsubas_shows(tmp_path: Path):
+    light = '<emitter type="point"><point name="position" value="1, 2, 1"/></emitter>'
+    path = written(tmp_path, scene_xml(GROUND + BALL + light, depth=2).replace(
+        "<lookat", '<scale x="-1"/><lookat'))
+    theirs = np.array(mi.render(mi.load_file(str(path)), spp=256))[..., :3]
+    scene = load_xml(path).scene
+    renderer = Renderer(scene, 16, 24)
+    ours = renderer.sample_sum(0, 1, 0, 256, antialias=True) / 256
+    off, off_mirrored = (abs(ours - image).mean() for image in (theirs, theirs[:, ::-1]))
+    assert off < 0.03 * theirs.mean() < off_mirrored / 4
+    for at in (0, 5):
+        moved = Renderer(onespp.animate(scene, camera="orbit"), 16, 24).frame(at)
+        points = np.concatenate([moved["position"], np.ones((16, 24, 1))], -1)
+        x, y, _, w = np.moveaxis(points @ moved.screen_from_world.T, -1, 0)
+        there = moved["id"] >= 0
+        assert np.linalg.det(moved.camera_from_world) < 0
+        np.testing.assert_allclose((x / w)[there], (np.mgrid[:16, :24][1] + 0.5)[there], atol=1e-3)
+        np.testing.assert_allclose((y / w)[there], (np.mgrid[:16, :24][0] + 0.5)[there], atol=1e-3)
+
+
 SHAPES = {
     "sphere": '<point name="center" value="0.1, 0.2, 0"/><float name="radius" value="0.7"/>',
     "rectangle": "", "disk": "", "cube": "",
