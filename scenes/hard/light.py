@@ -46,7 +46,7 @@ def glossy_color() -> Scene:
 def one_of_two() -> Scene:
     """Some of the light stays as it was, elsewhere than most of it."""
     side = Shape("side", Rectangle(), diffuse((0.0, 0.0, 0.0)), translate((-2.4, 1.6, 1.2))
-                 @ rotate(Y, 60) @ scale((0.4, 0.4, 1)), (3.0, 4.0, 6.0))
+                 @ rotate(Y, 60) @ scale((0.4, 0.4, 1)), (18.0, 24.0, 36.0))
     return scene("one-of-two", "One of two lamps is switched off over a still metal floor",
                  *surroundings(floor=metal((0.95, 0.8, 0.5), 0.25)), *_THINGS, side,
                  lamp(_at_event(LIGHT, (0.0, 0.0, 0.0))))
