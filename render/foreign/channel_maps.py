@@ -9,7 +9,8 @@ frame before, y up.
 
 Mitsuba: what the integrator `aov` writes, whose names are the user's: the letters T (distance),
 I (IDs) and U, V tell some, the rest is looked at: vectors of length one are normals, others
-positions; a second image of R, G and B is the albedo.
+positions; a second image of R, G and B is the albedo, unless it is radiance: what an integrator
+makes has an A, and that of the first one is in the file twice.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ def channel_map(images: Mapping[str, np.ndarray], layout: str,
                              f"{', '.join(COMPONENTS)}")
     blender = layout == "blender" or (layout == "auto" and any(
         ".Combined" in name for name in images))
-    found = _blender(images) if blender else _mitsuba(images, set(given))
+    found = _blender(images, given) if blender else _mitsuba(images, given)
     for name, source in given.items():
         found.pop(name, None)
         if source != NONE:
@@ -101,9 +102,11 @@ def _names(source: str, letters: str) -> tuple[str, ...]:
     return tuple(f"{source}{dot}{letter}" for letter in letters) or (source,)
 
 
-def _blender(images: Mapping[str, np.ndarray]) -> dict[str, tuple[str, ...]]:
+def _blender(images: Mapping[str, np.ndarray],
+             given: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
     layers = list(dict.fromkeys(name.rpartition(".Combined")[0] for name in images
                                 if ".Combined" in name))
+    layers = [s for s in layers if given.get("color", "").startswith(f"{s}.")] or layers
     if len(layers) > 1:
         raise InputError(f"has the view layers {', '.join(layers[:8])}: write one, or say which, "
                          f"as --channel color={layers[0]}.Combined")
@@ -118,7 +121,8 @@ def _blender(images: Mapping[str, np.ndarray]) -> dict[str, tuple[str, ...]]:
     return found
 
 
-def _mitsuba(images: Mapping[str, np.ndarray], known: set[str]) -> dict[str, tuple[str, ...]]:
+def _mitsuba(images: Mapping[str, np.ndarray],
+             given: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
     sources: dict[str, str] = {}
     for name in images:
         source, _, letter = name.rpartition(".")
@@ -128,22 +132,26 @@ def _mitsuba(images: Mapping[str, np.ndarray], known: set[str]) -> dict[str, tup
     root = min(colors, key=lambda s: (bool(s), s not in ("<root>", "root"), colors.index(s)),
                default=None)
     for source, letters in sources.items():
-        name = _kind(source, letters, images, is_root=source == root)
-        if name is None or name in known:
+        name = _kind(source, letters, images, root)
+        if name is None or name in given or source in given.values():
             continue
         if name in found:
             other = found[name][0].rpartition(".")[0]
             raise InputError(f"has two images that may be the {name}, '{other}' and '{source}': "
-                             f"say which, as --channel {name}={source}")
+                             f"say which, as --channel {name}={source}, or none")
         found[name] = _components(name, source, images)
     return found
 
 
 def _kind(source: str, letters: str, images: Mapping[str, np.ndarray],
-          is_root: bool) -> str | None:
+          root: str | None) -> str | None:
     """What an image is by its letters and values, None for nothing of ours."""
     if set("RGB") <= set(letters):
-        return "color" if is_root else "albedo"
+        if root is None or source == root:
+            return "color"
+        copied = all(np.array_equal(images[a], images[b], equal_nan=True)
+                     for a, b in zip(_names(source, "RGB"), _names(root, "RGB")))
+        return None if copied or "A" in letters else "albedo"
     if set("XYZ") <= set(letters):
         vectors = stacked(images, _names(source, "XYZ"))
         lengths = np.linalg.norm(vectors, axis=-1)

@@ -28,7 +28,7 @@ from onespp.render.frame import Frame
 from onespp.render.games202.layout import gaps
 
 from .camera_of_positions import camera_of_positions
-from .channel_maps import channel_map, stacked
+from .channel_maps import COMPONENTS, NONE, channel_map, stacked
 from .numbered_files import NumberedFiles, numbered_files
 
 FARTHEST = 1e9  # Blender has 1e10 where there is nothing
@@ -190,8 +190,8 @@ class _Reader:
     def _depth(self, stacks: Mapping[str, np.ndarray],
                camera: tuple[np.ndarray, np.ndarray] | None) -> np.ndarray:
         if camera is not None:
-            row = camera[1][3]
-            return stacks["position"].astype(np.float64) @ row[:3] + row[3]
+            row, position = camera[1][3], stacks["position"].astype(np.float64)
+            return np.where(np.isfinite(position), position, 0) @ row[:3] + row[3]
         if "depth" in stacks:
             return stacks["depth"]
         if "distance" not in stacks:
@@ -232,15 +232,24 @@ def _objects(reader: _Reader) -> dict[int, int]:
 
 
 def _shown(stacks: Mapping[str, np.ndarray], size: tuple[int, ...]) -> np.ndarray:
-    """(h, w) mask of pixels that show a surface."""
+    """(h, w) mask of pixels that show a surface: which may be said by any of the guides.
+
+    Of positions alone, (0, 0, 0) is what renderers write where there is nothing.
+    """
     shown = np.ones(size, bool)
-    for name in ("depth", "distance"):
-        if name in stacks:
-            with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore"):
+        for name in ("depth", "distance"):
+            if name in stacks:
                 shown &= (stacks[name] > 0) & (stacks[name] < FARTHEST)
-    if "normal" in stacks:
-        with np.errstate(invalid="ignore"):
+        if "normal" in stacks:
             shown &= np.abs(stacks["normal"]).sum(-1) > 0.1
+        if "position" in stacks:
+            farthest = np.abs(stacks["position"]).max(-1)
+            shown &= farthest < FARTHEST
+            if not {"depth", "distance", "normal"} & set(stacks):
+                shown &= farthest > 0
+        if "id" in stacks:
+            shown &= np.isfinite(stacks["id"])
     return shown
 
 
@@ -282,8 +291,9 @@ def _take_references(truth: NumberedFiles, sequence: FrameSequence, conventions:
 
 def _radiance(images: Mapping[str, np.ndarray], conventions: Conventions) -> tuple[str, ...]:
     """The channels of a reference's radiance: called as the frames', or by a layout's name."""
-    own = {k: v for k, v in conventions.channels.items() if k == "color"}
-    for given in (own, {}):
+    alone = {name: NONE for name in COMPONENTS if name != "color"}
+    own = alone | {k: v for k, v in conventions.channels.items() if k == "color"}
+    for given in (own, alone):
         with suppress(InputError):
             return channel_map(images, conventions.layout, given).channels["color"]
     return channel_map(images, conventions.layout, own).channels["color"]

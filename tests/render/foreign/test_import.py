@@ -18,6 +18,7 @@ from onespp.render.cli.arguments import parse_settings
 from onespp.render.errors import InputError
 from onespp.render.files.exr import read_any_exr
 from onespp.render.files.exr_header import _attributes
+from onespp.render.files.sequence import FrameSequence
 from onespp.render.foreign.camera_of_positions import camera_of_positions
 from onespp.render.foreign.channel_maps import channel_map
 from onespp.render.frame import Frame
@@ -196,6 +197,78 @@ def test_motion_read_the_wrong_way_is_named(frames, tmp_path, options, words, ca
         assert words in out
 
 
+def test_radiance_that_an_integrator_writes_twice_is_no_albedo(frames, tmp_path):
+    folder = mitsuba(tmp_path / "m", frames)
+    more = mitsuba(tmp_path / "more", frames)
+    for path in more.iterdir():
+        images = dict(read_any_exr(path))
+        for letter, other in zip("RGB", "GBR"):
+            images[f"img.{letter}"] = images[letter]
+            images[f"direct.{letter}"] = images[other]  # of another integrator
+        write(path, images | {"img.A": images["R"], "direct.A": images["R"]})
+    assert "albedo" in import_frames(more, tmp_path / "a", channels={"albedo": "alb"}).channels
+    sequence = import_frames(more, tmp_path / "b", reference=more)
+    assert sequence.has_reference(0)
+    plain = import_frames(folder, tmp_path / "c")
+    for i, frame in zip(sequence.frames, frames):
+        for name in ("color", "albedo"):
+            got, alone = (s.read_frame(i, [name])[name] for s in (sequence, plain))
+            np.testing.assert_array_equal(got, alone)
+        np.testing.assert_array_equal(sequence.read_reference(i).color, frame["color"])
+    rng = np.random.default_rng(0)
+    images = {name: rng.random((4, 4)) for name in ("R", "G", "B", "dd.T")}
+    images |= {f"img.{letter}": images[letter] for letter in "RGB"}
+    assert set(channel_map(images, "auto", {}).channels) == {"color", "distance"}
+    two = images | {f"{name}.{letter}": images["dd.T"] for name in "pq" for letter in "RGB"}
+    assert channel_map(two, "auto", {"color": "p"}).channels["albedo"] == ("q.R", "q.G", "q.B")
+
+
+def test_a_references_radiance_is_all_that_is_asked_of_it(frames, tmp_path):
+    truth = mitsuba(tmp_path / "t", frames)
+    for path in truth.iterdir():
+        images = dict(read_any_exr(path))
+        write(path, images | {f"other.{letter}": images["dd.T"] for letter in "RGB"})
+    sequence = import_frames(truth, tmp_path / "out", channels={"albedo": "alb"}, reference=truth)
+    assert [i for i in sequence.frames if sequence.has_reference(i)] == sequence.frames
+
+
+def test_one_of_several_view_layers_is_taken_as_said():
+    images = {f"{layer}.{name}.{letter}": np.zeros((4, 4)) for layer in ("a", "b")
+              for name in ("Combined", "Denoising Albedo") for letter in "RGB"}
+    found = channel_map(images, "auto", {"color": "b.Combined"}).channels
+    assert found["albedo"] == tuple(f"b.Denoising Albedo.{letter}" for letter in "RGB")
+
+
+@pytest.mark.parametrize("nothing", [0.0, np.inf, -np.inf, np.nan, 1e10])
+def test_positions_alone_tell_where_nothing_is(frames, tmp_path, nothing):
+    folder = tmp_path / "p"
+    folder.mkdir()
+    position = frames[0]["position"].copy()
+    position[:9] = nothing
+    write(folder / "1.exr", named("", frames[0]["color"], "RGB") | named("pp", position, "XYZ"))
+    frame = import_frames(folder, tmp_path / "out").read_frame(1, ["id", "depth", "normal"])
+    assert (frame["id"][:9] == -1).all()
+    assert not frame["depth"][:9].any()
+    assert not frame["normal"][:9].any()
+    there = frames[0]["id"][9:] >= 0
+    np.testing.assert_allclose(frame["depth"][9:][there], frames[0]["depth"][9:][there], rtol=1e-3)
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf])
+def test_an_id_that_is_no_number_is_of_nothing(frames, tmp_path, number, call):
+    folder = blender(tmp_path / "b", frames[:1])
+    path, = folder.iterdir()
+    images = {name: plane.copy() for name, plane in read_any_exr(path).items()}
+    y, x = np.argwhere(frames[0]["id"] >= 0)[0]
+    images["ViewLayer.IndexOB.X"][y, x] = number
+    write(path, images)
+    code, _, err = call("import", folder, "--out", tmp_path / "out")
+    assert code == 0, err
+    shown = FrameSequence.open(tmp_path / "out").read_frame(1, ["id"])["id"] >= 0
+    assert not shown[y, x]
+    assert shown.sum() == (frames[0]["id"] >= 0).sum() - 1
+
+
 def test_what_the_assignments_layout_would_ignore_is_refused(tmp_path):
     (tmp_path / "matrix_0.mat").write_bytes(b"")
     for options in ({"fov": 40.0}, {"reference": tmp_path}, {"motion_up": True}):
@@ -215,6 +288,8 @@ def test_a_camera_is_not_made_up():
     ({"A": 0}, {}, "no radiance"), ({"R": 0, "G": 0, "B": 0}, {"normal": "N"}, "channels of 'N'"),
     ({"R": 0}, {"colour": "R"}, "names no channel"),
     ({"a.Combined.R": 0, "b.Combined.R": 0}, {}, "view layers a, b"),
+    ({"R": 0, "G": 0, "B": 0, "p.R": 1, "p.G": 1, "p.B": 1, "q.R": 1, "q.G": 1, "q.B": 1}, {},
+     "may be the albedo, 'p' and 'q': .*or none"),
     ({"R": 0, "G": 0, "B": 0, "p.X": 1, "p.Y": 1, "p.Z": 1, "q.X": 1, "q.Y": 1, "q.Z": 1}, {},
      "may be the position")])
 def test_what_cannot_be_told_is_asked(images, given, words):
