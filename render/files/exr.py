@@ -18,7 +18,7 @@ import os
 import struct
 import sys
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -101,12 +101,20 @@ def read_header(path: Path) -> Header:
     return _check(path, read_bytes(path))[0]
 
 
-def read_any_exr(path: Path) -> dict[str, np.ndarray]:
+def read_any_exr(path: Path, tell: Callable[[str], None] = lambda what: None
+                 ) -> dict[str, np.ndarray]:
     """All channels of an image of any program: in any number of parts, tiled, lossy.
 
+    Data windows are padded with 0, or cropped, to the display window. Of a stereo image the first
+    view is taken.
+
+    Args:
+        tell: called with what was done of that.
+
     Returns:
-        name -> (h, w) read-only array. Where several parts have channels of one name, those of all
-        but the first are called PART.NAME.
+        name -> (h, w) read-only array. In a file of several parts a channel without a layer is in
+        that of its part's name; where several have channels of one name, those of all but the
+        first are called PART.NAME.
 
     Raises:
         InputError: not an EXR, deep, of several resolutions, incomplete, damaged, or in parts of
@@ -114,16 +122,45 @@ def read_any_exr(path: Path) -> dict[str, np.ndarray]:
     """
     data = read_bytes(path)
     headers = _check(path, data, any_kind=True)
-    sizes = list(dict.fromkeys((h.width, h.height) for h in headers))
+    sizes = list(dict.fromkeys(h.shown for h in headers))
     if len(sizes) > 1:
-        texts = " and ".join(f"{w}x{h}" for w, h in sizes[:2])
+        texts = " and ".join(f"{w}x{h}" for h, w in sizes[:2])
         raise InputError(f"{path} has parts of {texts} pixels: save one size in a file")
+    view = next((h.views[0] for h in headers if h.views), None)
     images: dict[str, np.ndarray] = {}
     for header, planes in zip(headers, _decode(path, data, headers)):
+        part = header.attributes.get("name", "")
+        if header.views and view != header.views[0]:
+            tell(f"of the views only '{view}' is taken")
+            continue
         for name, image in planes.items():
-            images[f"{header.attributes.get('name', '')}.{name}" if name in images else name
-                   ] = image
+            layer, _, _ = name.rpartition(".")
+            if layer.rpartition(".")[2] in header.views[1:]:
+                tell(f"of the views only '{view}' is taken")
+                continue
+            if len(headers) > 1 and part and not layer:
+                name = f"{part.removesuffix(f'.{view}')}.{name}"
+            images[f"{part}.{name}" if name in images else name] = _shown(image, header, tell)
     return images
+
+
+def _shown(image: np.ndarray, header: Header, tell: Callable[[str], None]) -> np.ndarray:
+    """Of a data window what the display window shows, and 0 where it has nothing."""
+    if (header.at, image.shape) == ((0, 0), header.shown):
+        return image
+    first = [max(at, 0) for at in header.at]
+    last = [max(min(at + size, most), start) for at, size, most, start in zip(
+        header.at, image.shape, header.shown, first)]
+    if first != [0, 0] or tuple(last) != header.shown:
+        tell("the data window is padded with 0 to the display window")
+    if first != list(header.at) or any(
+            at + size > most for at, size, most in zip(header.at, image.shape, header.shown)):
+        tell("the data window is cropped to the display window")
+    shown = np.zeros(header.shown, image.dtype)
+    there = tuple(slice(a, b) for a, b in zip(first, last))
+    shown[there] = image[tuple(slice(a - at, b - at) for a, b, at in zip(first, last, header.at))]
+    shown.flags.writeable = False
+    return shown
 
 
 def _decode(path: Path, data: bytes, headers: list[Header]) -> list[dict[str, np.ndarray]]:

@@ -22,6 +22,7 @@ _MAX_RATIO = 1100  # deflate, the strongest lossless one, cannot exceed 1032
 _MAX_LOSSY_RATIO = 20_000
 _TILED, _DEEP, _PARTS = 0x200, 0x800, 0x1000
 _MOST_PARTS = 1000
+_MOST_SHOWN = 1 << 26  # pixels of a display window that the data do not fill
 
 
 @dataclass(frozen=True)
@@ -32,12 +33,18 @@ class Header:
         height, width: of the data window.
         channels: name -> pixel type.
         attributes: the header's strings.
+        at: (row, column) of the data window's first pixel in the display window.
+        shown: (height, width) of the display window.
+        views: of a stereo image, the one without a name in its channels first.
     """
 
     height: int
     width: int
     channels: Mapping[str, np.dtype]
     attributes: Mapping[str, str]
+    at: tuple[int, int]
+    shown: tuple[int, int]
+    views: tuple[str, ...]
 
 
 class MalformedError(Exception):
@@ -104,13 +111,38 @@ def _part(attributes: Mapping[str, tuple[str, bytes]], default: bytes, size: int
             _MAX_LOSSY_RATIO if compression in _LOSSY else _MAX_RATIO):
         raise MalformedError(f"claims to be {width}x{height} pixels but is only {size} bytes "
                              "long: make it again")
+    # Our own files are all data.
+    display = (_display(attributes, width * height) if any_kind else (left, top, width, height))
     if kind == b"tiledimage":
         leaders = _tiles(attributes, width, height)
     else:
         leaders = [(top + rows * i,) for i in range(math.ceil(height / rows))]
     strings = {name: value.decode() for name, (kind, value) in attributes.items()
                if kind == "string"}
-    return Header(height, width, channels, strings), leaders
+    return Header(height, width, channels, strings, (top - display[1], left - display[0]),
+                  (display[3], display[2]), _views(attributes)), leaders
+
+
+def _display(attributes: Mapping[str, tuple[str, bytes]], pixels: int) -> tuple[int, ...]:
+    """(left, top, width, height) of the display window; pixels: of the data window."""
+    left, top, right, bottom = struct.unpack("<4i", _value(attributes, "displayWindow", "box2i"))
+    width, height = right - left + 1, bottom - top + 1
+    if not (0 < width <= _MAX_SIDE and 0 < height <= _MAX_SIDE
+            and width * height <= max(pixels, _MOST_SHOWN)):
+        raise MalformedError(f"claims to be shown in {width}x{height} pixels: make it again")
+    return left, top, width, height
+
+
+def _views(attributes: Mapping[str, tuple[str, bytes]]) -> tuple[str, ...]:
+    if "multiView" not in attributes:
+        kind, value = attributes.get("view", ("", b""))
+        return (value.decode(),) if kind == "string" else ()
+    data, at, views = _value(attributes, "multiView", "stringvector"), 0, []
+    while at < len(data):
+        size, = struct.unpack_from("<i", data, at)
+        views.append(data[at + 4:at + 4 + max(size, 0)].decode())
+        at += 4 + max(size, 0)
+    return tuple(views)
 
 
 def _tiles(attributes: Mapping[str, tuple[str, bytes]], width: int,

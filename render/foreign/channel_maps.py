@@ -36,6 +36,7 @@ LAYOUTS = ("auto", "games202", "blender", "mitsuba")
 _BLENDER = {"color": ("Noisy Image", "Combined"), "albedo": ("Denoising Albedo",),
             "normal": ("Normal", "Denoising Normal"), "position": ("Position",),
             "depth": ("Depth", "Z"), "id": ("IndexOB",), "motion": ("Vector",)}
+_ROOTS = ("<root>", "root", "rgba", "beauty")  # layers, or parts of a file, of radiance
 _SAME_LENGTH = 0.02  # of 1, of the median normal
 
 
@@ -129,7 +130,7 @@ def _mitsuba(images: Mapping[str, np.ndarray],
         sources[source] = sources.get(source, "") + letter
     found: dict[str, tuple[str, ...]] = {}
     colors = [s for s, letters in sources.items() if set("RGB") <= set(letters)]
-    root = min(colors, key=lambda s: (bool(s), s not in ("<root>", "root"), colors.index(s)),
+    root = min(colors, key=lambda s: (bool(s), s.lower() not in _ROOTS, colors.index(s)),
                default=None)
     for source, letters in sources.items():
         name = _kind(source, letters, images, root)

@@ -102,7 +102,7 @@ def import_foreign(folder: Path | str, out: Path | str, conventions: Conventions
         if new:
             sequence.remove()
         raise
-    for sentence in reader.notes():
+    for sentence in (*reader.notes(), *(truth.notes() if truth is not None else ())):
         tell(sentence)
     for a, b in gaps(sequence.frames):
         tell(f"there is no frame between {a} and {b}: methods with a history take {b} for the "
@@ -142,7 +142,7 @@ class _Reader:
     def notes(self) -> list[str]:
         channels = self.map.channels
         found = [f"{name} is {', '.join(sources)}" for name, sources in channels.items()]
-        told = [f"took from {self.files.folder}: {'; '.join(found)}"]
+        told = [f"took from {self.files.folder}: {'; '.join(found)}", *self.files.notes()]
         missing = [name for name in _TOLD if name not in channels
                    and not (name == "depth" and {"distance", "position"} & set(channels))]
         told += [f"there is no {name}: {_TOLD[name]}" for name in missing]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +21,11 @@ _NAME = re.compile(r"(.*?)[._ -]*?([0-9]{1,9})\.exr", re.IGNORECASE | re.DOTALL)
 
 @dataclass(frozen=True)
 class NumberedFiles:
-    """frames: number -> stem -> file."""
+    """frames: number -> stem -> file. done: what was done to files as they were read."""
 
     folder: Path
     frames: Mapping[int, Mapping[str, Path]]
+    done: dict[str, dict[Path, None]] = field(default_factory=dict, compare=False)
 
     def paths(self, i: int) -> list[Path]:
         return list(self.frames[i].values())
@@ -38,7 +39,8 @@ class NumberedFiles:
         images: dict[str, np.ndarray] = {}
         several = len({stem for files in self.frames.values() for stem in files}) > 1
         for stem, path in self.frames[i].items():
-            planes = read_any_exr(path)
+            planes = read_any_exr(
+                path, lambda what, path=path: self.done.setdefault(what, {}).setdefault(path))
             size, first = next(iter(planes.values())).shape, next(iter(images.values()), None)
             if first is not None and first.shape != size:
                 raise InputError(f"{path} is {size[1]}x{size[0]} pixels, other files of frame {i} "
@@ -46,6 +48,11 @@ class NumberedFiles:
             images |= {f"{stem}.{name}" if several and stem else name: image
                        for name, image in planes.items()}
         return images
+
+    def notes(self) -> list[str]:
+        """What a user should know of how files were read, so far."""
+        return [f"{self.folder}: {what} ({len(paths)} files, as {next(iter(paths)).name})"
+                for what, paths in self.done.items()]
 
 
 def numbered_files(folder: Path) -> NumberedFiles:

@@ -269,6 +269,110 @@ def test_an_id_that_is_no_number_is_of_nothing(frames, tmp_path, number, call):
     assert shown.sum() == (frames[0]["id"] >= 0).sum() - 1
 
 
+def windowed(path: Path, images: Mapping[str, np.ndarray], at: tuple[int, int],
+             shown: tuple[int, int] = SIZE, **more) -> None:
+    """Images of a data window that begins at (row, column) of a display window of another size,
+    which begins at (-7, 5)."""
+    h, w = next(iter(images.values())).shape
+    corner, first = np.array([5, -7], np.int32), np.array([5 + at[1], at[0] - 7], np.int32)
+    write(path, images, dataWindow=(first, first + np.array([w - 1, h - 1], np.int32)),
+          displayWindow=(corner, corner + np.array([shown[1] - 1, shown[0] - 1], np.int32)), **more)
+
+
+@pytest.mark.parametrize("tiled", [False, True])
+@pytest.mark.parametrize(("at", "size", "words"), [
+    ((3, 5), (20, 30), ["padded"]), ((-4, -6), (50, 66), ["cropped"]),
+    ((-3, 9), (20, 90), ["padded", "cropped"]), ((90, 90), (2, 3), ["padded", "cropped"]),
+    ((-9, 0), (2, 3), ["padded", "cropped"]), ((0, 0), SIZE, [])])
+def test_data_are_where_the_display_window_has_them(tmp_path, at, size, words, tiled):
+    whole = np.arange(1, 1 + 200 * 200, dtype=np.float32).reshape(200, 200)
+    there = np.zeros_like(whole)
+    rows, columns = (slice(100 + a, 100 + a + n) for a, n in zip(at, size))
+    there[rows, columns] = whole[rows, columns]
+    tiles = OpenEXR.TileDescription()
+    tiles.xSize = tiles.ySize = 16
+    windowed(tmp_path / "a.exr", {"Z": whole[rows, columns]}, at, **(
+        {"type": OpenEXR.tiledimage, "tiles": tiles} if tiled else {}))
+    said: list[str] = []
+    found = read_any_exr(tmp_path / "a.exr", said.append)["Z"]
+    np.testing.assert_array_equal(found, there[100:100 + SIZE[0], 100:100 + SIZE[1]])
+    assert [word for word in ("padded", "cropped") if any(word in line for line in said)] == words
+
+
+def test_layers_that_were_cropped_to_what_they_show_are_imported_and_told(frames, tmp_path, call):
+    folder = tmp_path / "b"
+    folder.mkdir()
+    frame = frames[0]
+    write(folder / "rgb1.exr", named("L.Combined", frame["color"], "RGB"))
+    depth = np.zeros(SIZE, np.float32)
+    depth[3:20, 5:30] = 2
+    windowed(folder / "z1.exr", {"L.Depth.Z": depth[3:20, 5:30]}, (3, 5))
+    code, out, err = call("import", folder, "--out", tmp_path / "out", "--channel",
+                          "depth=z.L.Depth", "--channel", "color=rgb.L.Combined")
+    assert code == 0, err
+    assert "padded with 0 to the display window (1 files, as z1.exr)" in out + err
+    got = FrameSequence.open(tmp_path / "out").read_frame(1, ["depth"])["depth"]
+    np.testing.assert_array_equal(got, depth)
+
+
+def test_a_display_window_is_no_larger_than_memory(tmp_path):
+    images = {"Z": np.ones((2, 3), np.float32)}
+    windowed(tmp_path / "a.exr", images, (0, 0), (1 << 14, 1 << 14))
+    with pytest.raises(InputError, match="claims to be shown in 16384x16384"):
+        read_any_exr(tmp_path / "a.exr")
+
+
+def parts(path: Path, images: Mapping[str, Mapping[str, np.ndarray]], **header) -> None:
+    """A file of parts by their names. header: name -> of each part."""
+    OpenEXR.File([OpenEXR.Part({
+        "compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage,
+        **{name: values[k] for name, values in header.items() if values[k]}},
+        {c: np.ascontiguousarray(image) for c, image in planes.items()}, part)
+        for k, (part, planes) in enumerate(images.items())]).write(str(path))
+
+
+def test_layers_may_be_the_names_of_parts(frames, tmp_path):
+    folder = tmp_path / "b"
+    folder.mkdir()
+    frame = frames[0]
+    parts(folder / "1.exr", {
+        "L.Combined": named("", frame["color"], "RGB"), "L.Depth": named("", frame["depth"], "V"),
+        "L.Normal": named("", frame["normal"], "XYZ"),
+        "other": named("L.IndexOB", frame["id"], "X"),
+        "L.Position": named("", frame["position"], "XYZ")})
+    sequence = import_frames(folder, tmp_path / "out")
+    got = sequence.read_frame(1, ["color", "normal", "depth"])
+    for name in ("color", "normal"):
+        np.testing.assert_allclose(got[name], frame[name], atol=1e-6)
+    np.testing.assert_allclose(got["depth"], frame["depth"], rtol=1e-3, atol=1e-4)
+
+
+def test_the_part_of_radiance_need_not_come_first():
+    images = {f"{part}.{letter}": np.full((4, 4), float(k)) for k, part in enumerate(
+        ("albedo", "beauty")) for letter in "RGB"}
+    found = channel_map(images, "auto", {}).channels
+    assert (found["color"][0], found["albedo"][0]) == ("beauty.R", "albedo.R")
+
+
+def test_a_part_alone_gives_no_layer_its_name(tmp_path):
+    parts(tmp_path / "a.exr", {"beauty": {"R": np.ones((2, 3), np.float32)}})
+    assert list(read_any_exr(tmp_path / "a.exr")) == ["R"]
+
+
+def test_of_a_stereo_image_one_view_is_taken(tmp_path):
+    one, two = (np.full((2, 3), value, np.float32) for value in (1.0, 2.0))
+    parts(tmp_path / "parts.exr", {"rgb.left": {"R": one}, "rgb.right": {"R": two},
+                                   "z": {"Z": one}}, view=["left", "right", ""])
+    parts(tmp_path / "names.exr", {"": {"R": one, "right.R": two, "d.right.R": two, "d.R": one}},
+          multiView=[["left", "right"]])
+    for name, channels in (("parts", {"rgb.R", "z.Z"}), ("names", {"R", "d.R"})):
+        said: list[str] = []
+        found = read_any_exr(tmp_path / f"{name}.exr", said.append)
+        assert set(found) == channels
+        assert all((image == 1).all() for image in found.values())
+        assert set(said) == {"of the views only 'left' is taken"}
+
+
 def test_what_the_assignments_layout_would_ignore_is_refused(tmp_path):
     (tmp_path / "matrix_0.mat").write_bytes(b"")
     for options in ({"fov": 40.0}, {"reference": tmp_path}, {"motion_up": True}):
