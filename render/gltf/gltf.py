@@ -15,6 +15,7 @@ import numpy as np
 
 from onespp.render.scene_files.loaded import FRAMES, Loaded, scene_name, unique_names
 from onespp.scenes.description import MOST_FRAMES, Scene, SceneError, Shape
+from onespp.scenes.transforms import Matrix
 
 from . import animations, cameras
 from .accessors import Accessors
@@ -95,8 +96,13 @@ def _shapes(document: Document, accessors: Accessors, shown: list[Node]) -> tupl
             if look.uv_set is not None and mesh.uv is None:
                 raise primitive.error(f"its material has textures, and it has no TEXCOORD_"
                                       f"{look.uv_set}: unwrap it, or take the textures out")
-            parts.append((node.name, node, {
-                "geometry": mesh, "material": look.material, "emission": look.emission}))
+            sides = (meshes.by_side(primitive, look.uv_set or 0) if look.bumpy
+                     else [(False, mesh)])
+            for left, mesh in sides:
+                look = materials.look(primitive, left != _mirrors(node.at(0)))
+                name = f"{node.name} mirrored" if left and len(sides) > 1 else node.name
+                parts.append((name, node, {
+                    "geometry": mesh, "material": look.material, "emission": look.emission}))
     made = []
     for name, (_, node, part) in zip(unique_names(name for name, _, _ in parts), parts):
         try:
@@ -104,3 +110,7 @@ def _shapes(document: Document, accessors: Accessors, shown: list[Node]) -> tupl
         except SceneError as error:
             raise node.item.error(str(error)) from None
     return tuple(made)
+
+
+def _mirrors(matrix: Matrix) -> bool:
+    return bool(np.linalg.det(matrix[:3, :3]) < 0)

@@ -35,11 +35,13 @@ class Look:
         material: None where it is not there at all (alpha below its cutoff).
         emission: None, (r, g, b), or a texture's dictionary. uv_set: that its textures need, None
             where it has no textures.
+        bumpy: whether it has a normal map.
     """
 
     material: dict[str, Any] | None
     emission: Any
     uv_set: int | None
+    bumpy: bool
 
 
 class Materials:
@@ -47,17 +49,19 @@ class Materials:
 
     def __init__(self, document: Document) -> None:
         self._document, self._textures = document, Textures(document)
-        self._made: dict[str, Look] = {}
+        self._made: dict[tuple[str, bool, bool], Look] = {}
 
-    def look(self, primitive: Item) -> Look:
-        """What a primitive looks like."""
+    def look(self, primitive: Item, left: bool = False) -> Look:
+        """What a primitive looks like. left: where a normal map's frame is left-handed."""
         item = (self._document.refer(primitive, "material", "materials")
                 if "material" in primitive else Item({}, "", primitive.file))
-        if item.path not in self._made:
-            self._made[item.path] = self._look(item)
-        return self._made[item.path]
+        own = "TANGENT" in primitive.part("attributes")
+        key = (item.path, left, own) if "normalTexture" in item else (item.path, False, False)
+        if key not in self._made:
+            self._made[key] = self._look(item, left, own)
+        return self._made[key]
 
-    def _look(self, item: Item) -> Look:
+    def _look(self, item: Item, left: bool, own_tangents: bool) -> Look:
         pbr = item.part("pbrMetallicRoughness")
         base = self._textures.texture(pbr, "baseColorTexture", color=True)
         rough = self._textures.texture(pbr, "metallicRoughnessTexture")
@@ -82,9 +86,9 @@ class Materials:
             self._document.leave(volume, "what a volume absorbs")
         solid = volume.number("thicknessFactor", 0, 0) > 0
         material = _covered(item, base, float(factor[3]), _material(
-            surface, solid, _normal_map(item, bumps)))
+            surface, solid, _normal_map(item, bumps, left, own_tangents)))
         return Look(material, self._emission(item, shining), self._uv_set(
-            item, base, rough, bumps, shining, clear))
+            item, base, rough, bumps, shining, clear), bumps is not None)
 
     def _emission(self, item: Item, shining: Texture | None) -> Any:
         factor = item.numbers("emissiveFactor", (0, 0, 0), 0)
@@ -164,11 +168,29 @@ def _covered(item: Item, base: Texture | None, factor: float,
     return material if opacity == 1 else {"type": "mask", "opacity": opacity, "bsdf": material}
 
 
-def _normal_map(item: Item, bumps: Texture | None) -> dict[str, Any] | None:
+def _normal_map(item: Item, bumps: Texture | None, left: bool,
+                own_tangents: bool) -> dict[str, Any] | None:
     if bumps is None:
         return None
     scale = item.part("normalTexture").number("scale", 1)
     n = (2 * bumps.pixels[..., :3].astype(np.float64) - 1) * (scale, scale, 1)
     lengths = np.linalg.norm(n, axis=2, keepdims=True)
     n = np.where(lengths > 0, n / np.where(lengths > 0, lengths, 1), (0, 0, 1))
+    n = _turned(n, None if own_tangents else bumps.placed.get("uv_from_surface"), left)
     return bumps.dictionary((n / 2 + 0.5).astype(np.float32))
+
+
+def _turned(values: np.ndarray, transform: np.ndarray | None, left: bool) -> np.ndarray:
+    """Normals (h, w, 3) of glTF as Mitsuba takes them, whose y is along n x t.
+
+    x is along t and y against d, the ways of the picture's u and v. Where its uv are a transform
+    (4, 4) of the surface's they are turned, as if those had one scale on the surface.
+    """
+    across, side = np.array([1.0, 0.0]), 1.0
+    if transform is not None and (side := float(np.sign(np.linalg.det(transform[:2, :2])))):
+        across = np.linalg.inv(transform[:2, :2])[:, 0]
+        across /= np.linalg.norm(across)
+    down = (side or 1.0) * np.array([-across[1], across[0]])
+    x, y, z = np.moveaxis(values, -1, 0)
+    along_t, along_d = (x * across[k] - y * down[k] for k in range(2))
+    return np.stack([along_t, along_d if left else -along_d, z], axis=-1)

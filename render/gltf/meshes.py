@@ -1,4 +1,8 @@
-"""Primitives of a file's meshes as triangles: lists, strips and fans, with indices or without."""
+"""Primitives of a file's meshes as triangles: lists, strips and fans, with indices or without.
+
+A normal map's frame has t along u and b upwards in the picture, against v. Where b is n x t it is
+right-handed, as Mitsuba's is; where the picture lies mirrored it is left-handed.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,8 @@ from .document import Document
 from .item import Item
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_ALONG = 0.7      # cosine: less is another direction
+_OF_OTHERS = 0.1  # share of faces
 
 
 class Meshes:
@@ -34,6 +40,25 @@ class Meshes:
         if key not in self._made:
             self._made[key] = self._read(primitive, uv_set)
         return self._made[key]
+
+    def by_side(self, primitive: Item, uv_set: int) -> list[tuple[bool, Mesh]]:
+        """The triangles of a primitive with texture coordinates, in parts on which a normal map's
+        frame is right-handed (False) and left-handed (True)."""
+        mesh, attributes = self.mesh(primitive, uv_set), primitive.part("attributes")
+        if mesh is None:
+            return []
+        tangents = None
+        if "TANGENT" in attributes:
+            tangents = self._accessors.floats(attributes, "TANGENT", "VEC4")
+            if len(tangents) != len(mesh.vertices):
+                raise attributes.error(f"it has {len(mesh.vertices)} positions and {len(tangents)} "
+                                       "tangents: export the file again")
+            if _are_elsewhere(mesh, tangents):
+                self._document.leave(attributes, "tangents that do not go along u")
+        left = _left_handed(mesh, tangents)
+        if left.all() or not left.any():
+            return [(bool(left[0]), mesh)]
+        return [(side, _part(mesh, left == side)) for side in (False, True)]
 
     def _read(self, primitive: Item, uv_set: int) -> Mesh | None:
         if primitive.extension("KHR_draco_mesh_compression").value:
@@ -87,3 +112,45 @@ def _faces(order: np.ndarray, mode: int) -> np.ndarray:
     if mode == _FAN:
         return np.stack([order[i + 1], order[i + 2], np.broadcast_to(order[:1], i.shape)], axis=1)
     return np.stack([order[i], order[i + 1 + i % 2], order[i + 2 - i % 2]], axis=1)
+
+
+def _left_handed(mesh: Mesh, tangents: np.ndarray | None) -> np.ndarray:
+    """(m,) of faces, of normal maps: by the sign of the file's tangents, or else by uv."""
+    if tangents is not None:
+        return tangents[mesh.faces, 3].sum(1) < 0
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
+    outside = np.cross(b - a, c - a)
+    if mesh.normals is not None:
+        facing = (outside * mesh.normals[mesh.faces].sum(1)).sum(1)
+        return _area(mesh) * np.where(facing < 0, -1, 1) > 0
+    return _area(mesh) > 0
+
+
+def _are_elsewhere(mesh: Mesh, tangents: np.ndarray) -> bool:
+    """Whether the file's tangents do not go along u."""
+    assert mesh.uv is not None
+    area = _area(mesh)
+    faces = mesh.faces[area != 0]
+    a, b, c = np.moveaxis(mesh.vertices[faces], 1, 0)
+    v = mesh.uv[faces, 1]
+    along = ((b - a) * (v[:, 2:] - v[:, :1]) - (c - a) * (v[:, 1:2] - v[:, :1])) * np.sign(
+        area[area != 0])[:, None]
+    theirs = tangents[faces, :3].sum(1)
+    lengths = np.linalg.norm(along, axis=1) * np.linalg.norm(theirs, axis=1)
+    others = (along * theirs).sum(1) < _ALONG * lengths
+    return bool(others.sum() > _OF_OTHERS * len(faces))
+
+
+def _part(mesh: Mesh, faces: np.ndarray) -> Mesh:
+    """Some of a mesh's faces, with the vertices they have."""
+    used, numbers = np.unique(mesh.faces[faces], return_inverse=True)
+    return Mesh(mesh.vertices[used], numbers.reshape(-1, 3),
+                *(None if array is None else array[used] for array in (mesh.normals, mesh.uv)))
+
+
+def _area(mesh: Mesh) -> np.ndarray:
+    """(m,) twice the areas of faces in the picture, above 0 where u, v turn with the vertices."""
+    assert mesh.uv is not None
+    a, b, c = np.moveaxis(mesh.uv[mesh.faces], 1, 0)
+    (u1, v1), (u2, v2) = (b - a).T, (c - a).T
+    return u1 * v2 - u2 * v1

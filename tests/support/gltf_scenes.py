@@ -191,7 +191,8 @@ def pictured(folder: Path) -> Made:
     to_uv[:2] = (2 * c, 3 * s, 0, 0.25), (-2 * s, 3 * c, 0, 0.5)
     base = _bitmap(p["colors"] * (1, 0.8, 0.6), to_uv=_transform(to_uv))
     surface = {"type": "twosided", "bsdf": {
-        "type": "normalmap", "normalmap": _bitmap(n / 2 + 0.5), "bsdf": {
+        # v is up on the floor: the picture is mirrored there.
+        "type": "normalmap", "normalmap": _bitmap(n * (1, -1, 1) / 2 + 0.5), "bsdf": {
             "type": "principled", "base_color": base, "metallic": _bitmap(
                 pictures["data"][..., 2:], wrap_mode="mirror"),
             "roughness": _bitmap(pictures["data"][..., 1:2] * 0.8, wrap_mode="mirror")}}}
