@@ -21,7 +21,7 @@ def check(folder: Path, json_to: str | None) -> None:
     vectors fit better when they are read in another way, it is named.
     """
     from onespp.api.importing import unfit_methods
-    from onespp.denoise.studies.agreement import AS_IT_IS, GOOD, agreement
+    from onespp.denoise.studies.agreement import AS_IT_IS, EXCHANGED, GOOD, agreement
     from onespp.render.cli.terminal import progress
 
     sequence = FrameSequence.open(folder)
@@ -34,8 +34,10 @@ def check(folder: Path, json_to: str | None) -> None:
                    f"({', '.join(f'{i}: {share:.1%}' for i, share in found.found)})")
         if found.better is not None:
             now, then = (found.readings[name] for name in (AS_IT_IS, found.better))
+            todo = ("Write it so into the files: no option does it" if found.better == EXCHANGED
+                    else "Import it so")
             click.echo(f"Motion looks wrong: of what moves, {now:.1%} is found {AS_IT_IS}, "
-                       f"{then:.1%} with {found.better}. Import it so.")
+                       f"{then:.1%} with {found.better}. {todo}.")
         elif found.share < GOOD:
             click.echo("That is few, and no other reading of motion finds more: check matrices, "
                        "depth, normals and IDs, or whether the camera cuts.")

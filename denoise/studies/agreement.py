@@ -25,20 +25,23 @@ GOOD = 0.9
 _MOVED = 1.0  # pixels: less tells no reading from another
 _FEWER_MISSES = 0.8  # of what is not found, for another reading to be the right one
 _LEAST_GAIN = 0.05
+_AS_GOOD = 0.01  # of what moves: no more tells one reading from another
 
 AS_IT_IS = "as it is"
+EXCHANGED = "x and y exchanged"
 _SIGNS = {
-    "its y turned over (--motion-y)": (1, -1),
-    "its x turned over": (-1, 1),
-    "its direction turned round (--motion previous)": (-1, -1),
+    "its y turned over (the other --motion-y)": (1, -1),
+    "its direction turned round (--motion previous, or without it where it was given)": (-1, -1),
+    "its x turned over (both, the other --motion-y and the other --motion)": (-1, 1),
 }
 _RIGHTED: Mapping[str, Callable[[Frame], Frame]] = {
     **{name: lambda frame, signs=signs: _with(frame, frame["motion"] * np.array(signs, np.float32))
        for name, signs in _SIGNS.items()},
-    "x and y exchanged": lambda frame: _with(frame, frame["motion"][..., ::-1]),
-    "none of it, by matrices alone": lambda frame: replace(frame, images={
+    "none of it, by matrices alone (--channel motion=none)": lambda frame: replace(frame, images={
         k: v for k, v in frame.images.items() if k != "motion"}),
+    EXCHANGED: lambda frame: _with(frame, frame["motion"][..., ::-1]),
 }
+"""In the order in which they are believed where they explain as much: what no option does last."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,8 @@ class Agreement:
         """The reading of motion by which far more is found; None where it is read rightly."""
         if not self.readings:
             return None
-        best = max(self.readings, key=lambda name: self.readings[name])
+        most = max(self.readings.values())
+        best = next(name for name, share in self.readings.items() if share >= most - _AS_GOOD)
         now, then = 1 - self.readings[AS_IT_IS], 1 - self.readings[best]
         return best if now - then > _LEAST_GAIN and then < _FEWER_MISSES * now else None
 

@@ -373,6 +373,32 @@ def test_of_a_stereo_image_one_view_is_taken(tmp_path):
         assert set(said) == {"of the views only 'left' is taken"}
 
 
+@pytest.mark.parametrize(("changed", "words"), [
+    ("previous", "its direction turned round (--motion previous"),
+    ("x", "its x turned over (both, the other --motion-y and the other --motion). Import it so"),
+    ("exchanged", "x and y exchanged. Write it so into the files: no option does it")])
+def test_of_readings_that_explain_as_much_one_with_an_option_is_named(tmp_path, changed, words,
+                                                                      call):
+    folder, (h, w) = tmp_path / "b", SIZE
+    folder.mkdir()
+    texture = np.random.default_rng(0).integers(0, 9, (h + 40, w + 40)) // 3
+    step = (3, 0) if changed == "previous" else (5, 2)  # sideways alone: turned round is x over
+    for k in range(3):
+        here = [slice(20 - k * s, 20 - k * s + n) for s, n in zip(step[::-1], SIZE)]
+        motion = -np.ones((h, w, 2)) * step
+        motion = {"previous": -motion, "x": motion * (-1, 1), "exchanged": motion[..., ::-1]
+                  }[changed]
+        write(folder / f"{k}.exr", named("", np.ones((h, w, 3)), "RGB") | named(
+            "m", motion, "UV") | named("i", texture[here[0], here[1]], "I") | {
+                "z.Z": np.full(SIZE, 5, np.float32)})
+    code, _, err = call("import", folder, "--out", tmp_path / "out", "--channel", "motion=m",
+                        "--channel", "depth=z")
+    assert code == 0, err
+    code, out, err = call("check", tmp_path / "out")
+    assert code == 0, err
+    assert words in out, out
+
+
 def test_what_the_assignments_layout_would_ignore_is_refused(tmp_path):
     (tmp_path / "matrix_0.mat").write_bytes(b"")
     for options in ({"fov": 40.0}, {"reference": tmp_path}, {"motion_up": True}):
