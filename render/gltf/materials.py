@@ -7,7 +7,7 @@
 Both models shade by GGX of alpha = roughness^2 with an F0 of 0.04 (or by `KHR_materials_ior`) and
 tint metals by the base colour; the diffuse lobe is Disney's, not Lambert's. Both sides of every
 surface are shaded: nothing is culled. Emission is radiance as it is: factor times texture times
-`KHR_materials_emissive_strength`.
+`KHR_materials_emissive_strength`, of that share of the surface that its alpha leaves.
 """
 
 from __future__ import annotations
@@ -85,16 +85,23 @@ class Materials:
         if "attenuationColor" in volume:
             self._document.leave(volume, "what a volume absorbs")
         solid = volume.number("thicknessFactor", 0, 0) > 0
-        material = _covered(item, base, float(factor[3]), _material(
+        opacity = _opacity(item, base, float(factor[3]))
+        material = _covered(opacity, _material(
             surface, solid, _normal_map(item, bumps, left, own_tangents)))
-        return Look(material, self._emission(item, shining), self._uv_set(
+        return Look(material, self._emission(item, shining, opacity), self._uv_set(
             item, base, rough, bumps, shining, clear), bumps is not None)
 
-    def _emission(self, item: Item, shining: Texture | None) -> Any:
+    def _emission(self, item: Item, shining: Texture | None, opacity: Any) -> Any:
         factor = item.numbers("emissiveFactor", (0, 0, 0), 0)
         factor = factor * item.extension("KHR_materials_emissive_strength").number(
             "emissiveStrength", 1, 0, 1e9)
         found = _values(shining, slice(0, 3), factor)
+        if np.any(factor) and (isinstance(opacity, dict) or opacity != 1):
+            if (isinstance(found, dict) and isinstance(opacity, dict)
+                    and not _lie_alike(found, opacity)):
+                self._document.leave(item, "alpha of emission whose texture lies otherwise")
+            else:
+                found = _times(found, opacity)
         if isinstance(found, dict):
             return found if found["bitmap"].any() else None
         return found if any(found) else None
@@ -146,26 +153,51 @@ def _material(surface: dict[str, Any], solid: bool,
             "bsdf_1": {"type": "twosided", "bsdf": shaded(metal)}}
 
 
-def _covered(item: Item, base: Texture | None, factor: float,
-             material: dict[str, Any]) -> dict[str, Any] | None:
-    """A material with the holes that its alpha makes; None where there is nothing but holes."""
+def _opacity(item: Item, base: Texture | None, factor: float) -> Any:
+    """What alpha leaves of a surface: a number or a texture's dictionary."""
     mode = item.text("alphaMode", "OPAQUE")
     if mode not in ("OPAQUE", "MASK", "BLEND"):
         raise item.error(f"its alphaMode is {brief(mode)}: there are OPAQUE, MASK and BLEND")
     if mode == "OPAQUE":
-        return material
+        return 1.0
     opacity = _values(base, slice(3, 4), factor)
     if mode == "MASK":
         cutoff = item.number("alphaCutoff", 0.5, 0)
         if isinstance(opacity, dict):
             # Between two texels there is no half a hole.
-            opacity |= {"bitmap": (opacity["bitmap"] >= cutoff).astype(np.float32),
-                        "filter_type": "nearest"}
-        else:
-            opacity = float(opacity >= cutoff)
+            return opacity | {"bitmap": (opacity["bitmap"] >= cutoff).astype(np.float32),
+                              "filter_type": "nearest"}
+        return float(opacity >= cutoff)
+    return opacity
+
+
+def _covered(opacity: Any, material: dict[str, Any]) -> dict[str, Any] | None:
+    """A material with the holes that its alpha makes; None where there is nothing but holes."""
     if opacity == 0:
         return None
     return material if opacity == 1 else {"type": "mask", "opacity": opacity, "bsdf": material}
+
+
+def _lie_alike(*textures: dict[str, Any]) -> bool:
+    """Whether two textures are on the same places of a surface."""
+    a, b = ((t["wrap_mode"], np.asarray(t.get("uv_from_surface", np.eye(4)))) for t in textures)
+    return a[0] == b[0] and np.array_equal(a[1], b[1])
+
+
+def _times(color: Any, opacity: Any) -> Any:
+    """A colour or texture times a share, each a number or a dictionary, of the finer one's texels:
+    of the opacity's filter, for holes have edges."""
+    if not isinstance(opacity, dict):
+        return (color | {"bitmap": color["bitmap"] * np.float32(opacity)}
+                if isinstance(color, dict) else tuple(c * opacity for c in color))
+    share = opacity["bitmap"]
+    if isinstance(color, dict):
+        size = [max(pair) for pair in zip(color["bitmap"].shape[:2], share.shape[:2])]
+        colors, share = (image[np.ix_(*(np.arange(n) * m // n for n, m in zip(size, image.shape)))]
+                         for image in (color["bitmap"], share))
+    else:
+        colors = np.asarray(color, np.float32)
+    return opacity | {"bitmap": (colors * share).astype(np.float32)}
 
 
 def _normal_map(item: Item, bumps: Texture | None, left: bool,
