@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 _SAMPLES = 4000
-_FEWEST = 32
+FEWEST = 32
 _NEAR = 2.0   # pixels
 _FITS = 1.0   # median, of samples anywhere in their pixels
 _OPEN = 1e-5  # of the largest: a second solution's error
@@ -29,7 +29,7 @@ def camera_of_positions(position: np.ndarray,
     """
     h, w = shown.shape
     at = np.flatnonzero(shown & np.isfinite(position).all(-1))
-    if at.size < _FEWEST:
+    if at.size < FEWEST:
         return None
     at = at[np.linspace(0, at.size - 1, min(at.size, _SAMPLES)).astype(np.int64)]
     u = np.stack([at % w + 0.5, at // w + 0.5], -1)
@@ -37,7 +37,7 @@ def camera_of_positions(position: np.ndarray,
     near = np.ones(at.size, bool)
     p = np.zeros((3, 4))
     for _ in range(_ROUNDS):
-        if near.sum() < _FEWEST or (found := _fitted(x[near], u[near], (h, w))) is None:
+        if near.sum() < FEWEST or (found := _fitted(x[near], u[near], (h, w))) is None:
             return None
         p = found
         off = _off(p, x, u)

@@ -27,7 +27,7 @@ from onespp.render.files.sequence import FrameSequence, Reference
 from onespp.render.frame import Frame
 from onespp.render.games202.layout import gaps
 
-from .camera_of_positions import camera_of_positions
+from .camera_of_positions import FEWEST, camera_of_positions
 from .channel_maps import COMPONENTS, NONE, channel_map, stacked
 from .numbered_files import NumberedFiles, numbered_files
 
@@ -167,6 +167,10 @@ class _Reader:
         shown = _shown(stacks, self.size)
         camera = (camera_of_positions(stacks["position"], shown) if self.solved else None)
         if self.solved and camera is None:
+            if (count := int(shown.sum())) < FEWEST:
+                raise InputError(f"shows surfaces in {count} pixels, too few for positions to tell "
+                                 "the camera: leave them out with --channel position=none, or the "
+                                 "frame")
             raise InputError("has positions that no camera sees in these pixels, or all in one "
                              "plane: check that they are in world space, or leave them out with "
                              "--channel position=none")

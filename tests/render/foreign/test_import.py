@@ -254,6 +254,14 @@ def test_positions_alone_tell_where_nothing_is(frames, tmp_path, nothing):
     np.testing.assert_allclose(frame["depth"][9:][there], frames[0]["depth"][9:][there], rtol=1e-3)
 
 
+def test_positions_of_nothing_tell_no_camera_and_that_is_said(frames, tmp_path):
+    (tmp_path / "p").mkdir()
+    write(tmp_path / "p" / "1.exr", named("", frames[0]["color"], "RGB")
+          | named("pp", np.zeros((*SIZE, 3)), "XYZ"))
+    with pytest.raises(InputError, match="shows surfaces in 0 pixels, too few for positions"):
+        import_frames(tmp_path / "p", tmp_path / "out")
+
+
 @pytest.mark.parametrize("number", [np.nan, np.inf])
 def test_an_id_that_is_no_number_is_of_nothing(frames, tmp_path, number, call):
     folder = blender(tmp_path / "b", frames[:1])
