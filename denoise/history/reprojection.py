@@ -86,7 +86,8 @@ class Motion(NamedTuple):
 
 
 def motion_table(previous: Frame, current: Frame) -> np.ndarray:
-    """(objects, 16) float32: E | S' t of each object, then zeros; see the module's header.
+    """(objects, 16) float32: E | S' t of each object, see the module's header; then whether it is
+    at rest, 1 or 0, and zeros.
 
     An object whose matrix is singular, or that only one of the frames has, gets NaN: no history.
     """
@@ -96,8 +97,10 @@ def motion_table(previous: Frame, current: Frame) -> np.ndarray:
     e = s_previous @ t[:, :3, :3] @ camera_from_screen(current) - np.eye(3)
     table = np.zeros((len(t), _ROW))
     table[:, :12] = np.concatenate([e, (t[:, :3, 3] @ s_previous.T)[..., None]], 2).reshape(-1, 12)
+    rests = (motion == np.eye(4)).all((1, 2))
     if _same_view(previous, current):
-        table[(motion == np.eye(4)).all((1, 2))] = 0
+        table[rests] = 0
+    table[:, 12] = rests
     return table.astype(np.float32)
 
 
@@ -157,7 +160,7 @@ class Place:
         x, y: screen position in the previous frame. inside: whether it is on that screen.
         id: object ID. normal: expected there. rough: whether there is no normal.
         plane, offset, nearness: a pixel at u' with depth z' is near the expected tangent plane
-            if |z' plane . u' - offset| < nearness.
+            if |z' plane . u' - offset| < nearness. rests: 1 where the object is at rest, else 0.
     """
 
     x: Float
@@ -169,6 +172,7 @@ class Place:
     plane: Vector3
     offset: Float
     nearness: Float
+    rests: Float
 
 
 def locate(stencil: Stencil, surface: SurfaceSample, motion: Motion, plane_tolerance: Float,
@@ -182,8 +186,8 @@ def locate(stencil: Stencil, surface: SurfaceSample, motion: Motion, plane_toler
     float_t, table = stencil.Float, motion.table
     id_, normal, depth = surface
     known = (id_ >= 0) & (id_ < dr.width(table) // _ROW)
-    words = stencil.unpack(table, dr.select(known, id_, 0), _ROW, 12)
-    e, translation = Matrix3(*[Vector3(*words[at:at + 3]) for at in (0, 4, 8)]), words[3::4]
+    words = stencil.unpack(table, dr.select(known, id_, 0), _ROW, 13)
+    e, translation = Matrix3(*[Vector3(*words[at:at + 3]) for at in (0, 4, 8)]), words[3:12:4]
     row, column = stencil.pixel()
     u = Vector3(float_t(column) + 0.5, float_t(row) + 0.5, float_t(1))
     if shift is not None:
@@ -203,7 +207,8 @@ def locate(stencil: Stencil, surface: SurfaceSample, motion: Motion, plane_toler
                        for v in _turned(e, normal, motion.transforms))
     depth = depth * scale
     return Place(x, y, inside, float_t(id_), expected, dot(normal, normal) <= 0.25, plane,
-                 depth * dot(plane, Vector3(x, y, float_t(1))), plane_tolerance * depth)
+                 depth * dot(plane, Vector3(x, y, float_t(1))), plane_tolerance * depth,
+                 dr.select(known & (words[12] > 0), float_t(1), 0))
 
 
 class Reprojected(NamedTuple):

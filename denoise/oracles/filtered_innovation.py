@@ -721,7 +721,9 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
             if sparse:
                 norm = norm_of(frame, here, found, smoothing, m, narrow)[..., None]
                 change = np.clip(h + norm * wide, -0.5, 2) - h
-            k = light_threshold if name == "L" else m.noise_threshold
+            k = m.noise_threshold
+            if name == "L":
+                k = np.where(at_rest(previous, frame), light_threshold, k)
             known = lights.sudden * np.maximum(np.abs(lum(d - e)), np.abs(lum(d - e + wide)))
             left = length_left(name, wide, q, energy, change, h, p, k, known, moving)
             if not sparse:
@@ -742,7 +744,9 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
             follow = np.maximum(m.glossy_gain * (2 + np.minimum(30 * turn, 1)) / 3
                                 if "roughness" in frame else m.glossy_gain, alpha)
             if name != "G":
-                k = light_threshold if name == "L" else m.noise_threshold
+                k = m.noise_threshold
+                if name == "L":
+                    k = np.where(at_rest(previous, frame), light_threshold, k)
                 certain = 1 - k * q / np.maximum(lum(wide) ** 2, 1e-20)
                 expected = (m.expected_change * lum(h + wide)) ** 2
                 slow = m.min_gain * expected / np.maximum(expected + q, 1e-20)
@@ -796,6 +800,15 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
     return out
 
 
+def at_rest(previous: Frame | None, frame: Frame) -> np.ndarray:
+    """Where the object has not moved."""
+    if previous is None:
+        return np.zeros(frame["id"].shape, bool)
+    still = [np.array_equal(*both) for both in zip(previous.world_from_object,
+                                                   frame.world_from_object)]
+    return (frame["id"] >= 0) & np.array(still)[frame["id"]]
+
+
 def share_of_moving_lights(previous: Frame, frame: Frame) -> float:
     """Twice the share of the rays that went to lights that have moved, at most 1."""
     asked = np.abs(frame["light"]).sum(-1) > 0
@@ -826,7 +839,7 @@ def coin(visibility: np.ndarray) -> np.ndarray:
 
 
 def length_left(name: str, wide: np.ndarray, q: np.ndarray, energy: np.ndarray,
-                change: np.ndarray, h: np.ndarray, p: float, k: float, known: np.ndarray,
+                change: np.ndarray, h: np.ndarray, p: float, k: Any, known: np.ndarray,
                 moving: np.ndarray | None = None) -> np.ndarray:
     """n, or N, that a change of light leaves at most; known: what is known to have changed."""
     threshold = k * (1 if name in "LG" else 0.5 if moving is None else 4 - 3.5 * moving)

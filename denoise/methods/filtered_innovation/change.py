@@ -22,9 +22,10 @@ of the light that has changed at once, times the greater of l(h) and l(h + S[e])
 All of it is of the surroundings: were n of the pixel's own noise, a would go with it, and the mean
 of the history be off (3 % of energy too much with n of h itself).
 
-Of diffuse light k is four times that where lights are known to be as they were. Of visibility it is
-half of that, and four times that where shadow rays tell that shadow and surface stand still: near a
-contact S is of few rays, and has little else to tell there.
+Of diffuse light k is four times that on surfaces at rest where lights are known to be as they were:
+on one that moves, light changes. Of visibility it is half of that, and four times that where shadow
+rays tell that shadow and surface stand still: near a contact S is of few rays, and has little else
+to tell there.
 
 Of a sparse signal D_u is 0, N is v (1 - v), D = max(c, 0)^2 (S[e] / S[omega])^2, and what is
 limited is the sum of omega.
@@ -59,8 +60,8 @@ def certainty(spread: Float, size: Float, threshold: Float) -> Float:
 
 
 class Doubts(NamedTuple):
-    """What a change is judged by: k, of diffuse light and of others; p of each signal; and the
-    share of the light that has changed at once."""
+    """What a change is judged by: k, of diffuse light on surfaces at rest and of all else; p of
+    each signal; and the share of the light that has changed at once."""
 
     light_threshold: Float
     threshold: Float
@@ -88,7 +89,7 @@ def lengths_left(layout: SignalLayout, signals: list[Signal], innovations: Innov
         elif kind is SignalKind.GLOSSY:
             spread = smoothed.energies[s] / GLOSSY_SAMPLES
         else:
-            spread, k = smoothed.diffuse_spread, doubts.light_threshold
+            spread, k = smoothed.diffuse_spread, threshold_of_light(doubts, innovations.rests)
         if kind is not SignalKind.VISIBILITY:
             known = dr.square(known_change(
                 signals[s], innovations.signals[s], wide, doubts.sudden))
@@ -117,6 +118,11 @@ def _left(kind: SignalKind, wide: Signal, spread: Float, energy: Float, threshol
     size = dr.minimum(size, energy * (energy / dr.maximum(size, MIN_ENERGY)))
     noise = dr.maximum(energy - size, energy * _LEAST_SHARE)
     return dr.select(size > MIN_ENERGY, noise / dr.maximum(p * size, MIN_ENERGY), _KEPT)
+
+
+def threshold_of_light(doubts: Doubts, rests: Float) -> Float:
+    """k of diffuse light; rests: of `Innovations`."""
+    return dr.fma(doubts.light_threshold - doubts.threshold, rests, doubts.threshold)
 
 
 def known_change(signal: Signal, innovation: Signal, wide: Signal, share: Float) -> Float:

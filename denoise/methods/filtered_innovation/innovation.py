@@ -140,6 +140,7 @@ class Innovations(NamedTuple):
             `reflections.py`, None where the lobes of glossy light are not known.
         unrest: how much each visibility that shadow rays tell of may have changed by motion, 0
             where its shadow and its surface stand still on the screen, to 1.
+        rests: 1 where the surface is at rest in the world, else 0.
         contact: of `contact.contact_falloff`, None where there are no shadow rays.
         misses: what reprojection may miss of texture, see `texture.py`; at_rest: of that module;
             spatial: of `noise.py`, of such light.
@@ -155,6 +156,7 @@ class Innovations(NamedTuple):
     sparse: list[SparseHistory]
     turned: Float | None
     unrest: list[Float]
+    rests: Float
     misses: Float | None = None
     at_rest: AtRest | None = None
     spatial: Float | None = None
@@ -226,7 +228,7 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
     return Innovations(e, energies, lengths, variances, valid_inverse_depth, others,
                        footprint_falloffs(penumbras, falloff_scale, MIN_SHARE), sparse,
                        None if lobes is None else turned(lobes, surface.normal, place),
-                       _unrest(stencil, shadows, place), misses, at_rest, spatial,
+                       _unrest(stencil, shadows, place), place.rests, misses, at_rest, spatial,
                        mapped(lambda near: falloff_scale * near, around.contact))
 
 

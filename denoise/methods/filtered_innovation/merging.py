@@ -24,6 +24,7 @@ from .change import (
     coin_variance,
     known_change,
     lengths_left,
+    threshold_of_light,
 )
 from .innovation import Innovations, ShadowInnovation, weights_of
 from .layout import NoisySignal, Pair, SignalLayout, Smoothed
@@ -118,7 +119,7 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
         alpha, gain = gains.alphas[s], gains.glossy_gain
         if kind is SignalKind.DIFFUSE:
             certain = certainty(smoothed.diffuse_spread, dr.square(wide.luminance),
-                                gains.doubts.light_threshold)
+                                threshold_of_light(gains.doubts, innovations.rests))
             change = gains.expected_change * (signal.luminance - e.luminance + wide.luminance)
             gain = dr.maximum(certain, gains.min_gain * expected_gain(
                 change, smoothed.diffuse_spread))

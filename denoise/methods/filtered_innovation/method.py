@@ -131,8 +131,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             the noise of the smoothed innovation is more than that, history takes less of it
             [share of the light, above 0].
         noise_threshold: a smoothed innovation whose square is below this many of its variances
-            is taken for noise; fewer where lights move, and four times as many, of diffuse light,
-            where they are known to be as they were [variances, 0 to 1e6].
+            is taken for noise; fewer where lights move, and four times as many, of diffuse light on
+            surfaces at rest, where they are known to be as they were [variances, 0 to 1e6].
         sharp_min_gain: as `min_gain`, of visibility; less where shadows stand still, up to 0.9
             where lights move, see `innovation.py` [1, 1e-6 to 1].
         glossy_gain: share of the smoothed innovation that the history of glossy light takes;
