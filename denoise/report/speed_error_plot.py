@@ -16,6 +16,7 @@ from onespp.denoise.score.scorecard import INPUT, Scores
 from onespp.render.files.atomic import replacing
 
 FAR = 8.0  # dB; a floor further above the best method would flatten what is to be compared
+_GAP = 20  # pixels of a name from the axis, which names on the right may move
 _GREY, _INK = "#8a8f98", "#22252b"
 
 
@@ -115,7 +116,8 @@ def _levels(axes, scores: Scores, best: float) -> None:
 
 
 def _label(figure: Figure, axes, points: dict[str, tuple[float, float]]) -> None:
-    """Name the points, each in the first place around it that is still free."""
+    """Name the points, each in the first place around it that is still free, moved to the right
+    where it would lie across the axis."""
     places = [(0, 9, "center", "bottom"), (11, 0, "left", "center"), (0, -9, "center", "top"),
               (-11, 0, "right", "center"), (9, 9, "left", "bottom"), (9, -9, "left", "top"),
               (-9, 9, "right", "bottom"), (-9, -9, "right", "top")]
@@ -132,6 +134,10 @@ def _label(figure: Figure, axes, points: dict[str, tuple[float, float]]) -> None
                                  textcoords="offset points", color=_INK, fontsize=10.5, zorder=5,
                                  path_effects=[withStroke(linewidth=3.5, foreground="white")])
             box = text.get_window_extent(figure.canvas.get_renderer())
+            across = max(axes.bbox.x0 + _GAP - box.x0, 0)
+            if across:
+                text.set_position((dx + across * 72 / figure.dpi, dy))
+                box = box.translated(across, 0)
             if not any(box.x0 < x1 and x0 < box.x1 and box.y0 < y1 and y0 < box.y1
                        for x0, y0, x1, y1 in taken):
                 break

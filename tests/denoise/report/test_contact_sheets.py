@@ -312,6 +312,20 @@ def test_a_plot_of_one_method_and_of_many_shows_a_point_each(tmp_path, drawn, co
         assert (colour in seen) == (i < count)
 
 
+def test_no_name_lies_across_the_axis(tmp_path, drawn):
+    base = drawn[1].methods["fine"]
+    methods = {"a name as long as names may be": base.model_copy(update={"ms_per_frame": 10.0}),
+               "slow": base.model_copy(update={"ms_per_frame": 400.0})}
+    scores = drawn[1].model_copy(update={"methods": methods})
+    assert plot_speed_against_error(scores, tmp_path / "plot.png")
+    with Image.open(tmp_path / "plot.png") as image:
+        dark = np.asarray(image.convert("L")) < 80
+    axis = dark[:, :dark.shape[1] // 4]
+    rows = np.flatnonzero(axis[:, axis.sum(0).argmax()])
+    pieces = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    assert max(map(len, pieces)) > 0.7 * dark.shape[0]
+
+
 def test_a_plot_takes_a_scene_of_any_name(tmp_path, drawn):
     scores = drawn[1].model_copy(update={"scene": r"a$b_$^{ \frac"})
     assert plot_speed_against_error(scores, tmp_path / "plot.png")
