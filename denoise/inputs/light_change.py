@@ -4,14 +4,18 @@ Symbols: U unshadowed light over albedo, at places of objects at rest that two f
 former of the two; l luminance.
 
     ratio = median of U / U', of each colour channel; a place counts by the greater of the two
-    left = sum |l(U) - l(ratio U')| / sum max(l(U), l(ratio U'))
+    left = sum |l(U) - l(ratio U')| / sum l(U)
+    renewal = x^2 / (x^2 + 1),   x = max(left - 1/4, 0)
 
 Where all lights have changed alike, as where there is one, `left` is nearly 0, and all that they
-send, by way of surfaces and mirrors too, has changed by `ratio`: histories go with it. Where that
-leaves more than two fifths of the change it is 1, and so it is where that is within 1 %, as far as
-places are found again to a pixel. Unshadowed light tells of lights behind walls, too: nothing is
-known where direct light D, with its shadows and its noise, has changed by another ratio of sums
-than U has, by more than a third.
+send, by way of surfaces and mirrors too, has changed by `ratio`: histories go with it. It is 1
+where it leaves more than two fifths of the change, or more than 1/4, and where it is within 1 % of
+that, as far as places are found again to a pixel. Unshadowed light tells of lights behind walls,
+too: nothing is known where direct light D, with its shadows and its noise, has changed by another
+ratio of sums than U has, by more than a third.
+
+`renewal` is the least weight of a frame where history is off by x of the light, that is by what a
+smoothed innovation cannot keep up with, and a sample's noise is as much as its mean.
 """
 
 from __future__ import annotations
@@ -24,7 +28,7 @@ from onespp.denoise.geometry.cameras import camera_points, every
 from onespp.denoise.geometry.motion import at_rest
 from onespp.render.frame import Frame
 
-LARGEST_RATIO = 8.0
+LARGEST_RATIO = 1000.0
 _PLACES = 512              # that are looked at
 _FEWEST = 32               # that say something
 _SMALLEST_ALBEDO = 0.05
@@ -33,7 +37,8 @@ _SAME = 0.01               # ratio - 1 that is none
 _UNEXPLAINED = 0.4         # share of the change that a ratio may leave
 _DIFFERENT = 4 / 3         # times a gain, which is another one
 _RESTS = 0.05              # `left` of lights that have not changed
-_SUDDEN = 0.2              # `left` that a smoothed innovation keeps up with
+_FOLLOWED = 0.25           # `left` that a smoothed innovation keeps up with
+_MOST_LEFT = 1e6
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
@@ -58,9 +63,10 @@ class LightChange(NamedTuple):
         return self.ratio == (1.0, 1.0, 1.0) and self.left is not None and self.left < _RESTS
 
     @property
-    def sudden(self) -> float:
-        """How much of the light has changed, from 0, what can be followed, to 1, all of it."""
-        return max((self.left or 0.0) - _SUDDEN, 0.0) / (1 - _SUDDEN)
+    def renewal(self) -> float:
+        """Least weight of the frame; see above."""
+        x = max((self.left or 0.0) - _FOLLOWED, 0.0)
+        return x * x / (x * x + 1)
 
 
 def sample_light(frame: Frame) -> LightSample:
@@ -125,7 +131,7 @@ def _change(old: np.ndarray, new: np.ndarray) -> LightChange:
     ratio = np.clip([_median(*both) for both in zip(each.T, weight.T, strict=True)],
                     1 / LARGEST_RATIO, LARGEST_RATIO)
     left = _left(old * ratio, new)
-    if (np.abs(ratio - 1) < _SAME).all() or left > _UNEXPLAINED * without:
+    if (np.abs(ratio - 1) < _SAME).all() or left > min(_UNEXPLAINED * without, _FOLLOWED):
         return LightChange(left=without)
     red, green, blue = ratio.tolist()
     return LightChange((red, green, blue), left)
@@ -143,8 +149,9 @@ def _apart(one: float, other: float) -> bool:
 
 
 def _left(old: np.ndarray, new: np.ndarray) -> float:
-    a, b = old @ _LUMINANCE, new @ _LUMINANCE
-    return float(np.abs(a - b).sum() / max(np.maximum(a, b).sum(), 1e-300))
+    now = new @ _LUMINANCE
+    change = np.abs(old @ _LUMINANCE - now).sum()
+    return min(float(change / max(now.sum(), 1e-300)), _MOST_LEFT)
 
 
 def _median(values: np.ndarray, weights: np.ndarray) -> float:

@@ -582,8 +582,9 @@ class Lights(NamedTuple):
         return bool((self.ratio == 1).all() and self.left < 0.05)
 
     @property
-    def sudden(self) -> float:
-        return max(self.left - 0.2, 0.0) / 0.8 if self.left >= 0 else 0.0
+    def renewal(self) -> float:
+        x = max(self.left - 0.25, 0.0) if self.left >= 0 else 0.0
+        return x**2 / (x**2 + 1)
 
 
 def changes_of_light(frames: list[Frame]) -> list[Lights]:
@@ -613,14 +614,14 @@ def lights_between(previous: Frame, frame: Frame) -> Lights | None:
     old, new, direct_before, direct = np.maximum(np.moveaxis(np.array(places), 1, 0), 0)
     before, now, arrived_before, arrived = (
         luminance(light).sum() for light in (old, new, direct_before, direct))
-    gains = [np.clip(b / a, 1 / 8, 8) if a > 0 else 1.0
+    gains = [np.clip(b / a, 1 / 1000, 1000) if a > 0 else 1.0
              for a, b in ((before, now), (arrived_before, arrived))]
     if max(gains) > 4 / 3 * min(gains) or not np.maximum(old, new).max() > 0:
         return None
 
     def left(ratio: Any) -> float:
         a, b = luminance(old * ratio), luminance(new)
-        return np.abs(a - b).sum() / np.maximum(a, b).sum()
+        return min(np.abs(a - b).sum() / max(b.sum(), 1e-300), 1e6)
 
     each = new / np.maximum(old, 1e-6 * np.maximum(old, new).max())
     ratio = np.ones(3)
@@ -628,8 +629,9 @@ def lights_between(previous: Frame, frame: Frame) -> Lights | None:
         weights = np.maximum(old, new)[:, c]
         order = np.argsort(each[:, c])
         half = np.cumsum(weights[order]) >= weights.sum() / 2
-        ratio[c] = np.clip(each[order[np.argmax(half)], c], 1 / 8, 8) if weights.any() else 1
-    if left(1) < 0.01 or (np.abs(ratio - 1) < 0.01).all() or left(ratio) > 0.4 * left(1):
+        ratio[c] = np.clip(each[order[np.argmax(half)], c], 1e-3, 1e3) if weights.any() else 1
+    if (left(1) < 0.01 or (np.abs(ratio - 1) < 0.01).all()
+            or left(ratio) > min(0.4 * left(1), 0.25)):
         return Lights(np.ones(3), left(1))
     return Lights(ratio, left(ratio))
 
@@ -724,16 +726,17 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
             k = m.noise_threshold
             if name == "L":
                 k = np.where(at_rest(previous, frame), light_threshold, k)
-            known = lights.sudden * np.maximum(np.abs(lum(d - e)), np.abs(lum(d - e + wide)))
-            left = length_left(name, wide, q, energy, change, h, p, k, known, moving)
+            left = length_left(name, wide, q, energy, change, h, p, k, moving)
+            if name in "LG":
+                left = np.minimum(left, 1 / max(lights.renewal, 1e-6))
             if not sparse:
                 key = length_of(frame, name)
                 ns[key] = np.maximum(np.minimum(ns[key], np.where(found, left, 1)), 1)
             parts[name] = (e, h, wide, q, energy, s2, samples, omega, here, lone, change, left,
-                           spatial, narrow, turn, moving, known)
+                           spatial, narrow, turn, moving)
         for name, d in signals.items():
             (e, h, wide, q, energy, s2, samples, omega, here, lone, change, left, spatial,
-             narrow, turn, moving, sudden) = parts[name]
+             narrow, turn, moving) = parts[name]
             alpha, _, levels, sigma, _ = settings.get(name, visible)
             sparse = name.isdigit()
             levels = max(levels - 1, 1) if sparse else levels
@@ -753,9 +756,6 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
                 sharp = m.sharp_min_gain * (1 if moving is None else 0.4 + 0.6 * moving)
                 follow = np.maximum(certain, slow if name == "L" else sharp)
                 a = a if name == "L" else np.maximum(a, m.change_alpha * certain)
-            if name in "LG":
-                of = q if name == "L" else energy / 48
-                follow = np.maximum(follow, sudden**2 / np.maximum(sudden**2 + of, 1e-20))
             if sparse:
                 follow = np.maximum(follow, 1 - known)
                 noise = most = coin((h + change)[..., 0])
@@ -839,9 +839,9 @@ def coin(visibility: np.ndarray) -> np.ndarray:
 
 
 def length_left(name: str, wide: np.ndarray, q: np.ndarray, energy: np.ndarray,
-                change: np.ndarray, h: np.ndarray, p: float, k: Any, known: np.ndarray,
+                change: np.ndarray, h: np.ndarray, p: float, k: Any,
                 moving: np.ndarray | None = None) -> np.ndarray:
-    """n, or N, that a change of light leaves at most; known: what is known to have changed."""
+    """n, or N, that a change of light leaves at most."""
     threshold = k * (1 if name in "LG" else 0.5 if moving is None else 4 - 3.5 * moving)
     luminance2 = size = lum(wide) ** 2
     if name.isdigit():
@@ -855,7 +855,6 @@ def length_left(name: str, wide: np.ndarray, q: np.ndarray, energy: np.ndarray,
     q = energy / 48 if name == "G" else q
     certain = 1 - threshold * q * (1 - alike**4) / np.maximum(size, 1e-20)
     size = size * np.maximum(certain, 0) ** 2
-    size = size if name == "V" else np.maximum(size, known**2)
     size = np.minimum(size, energy**2 / np.maximum(size, 1e-20))
     noise = np.maximum(energy - size, energy / 16)
     return np.where(size > 1e-20, noise / np.maximum(p * size, 1e-20), 1e6)

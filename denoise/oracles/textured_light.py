@@ -43,7 +43,7 @@ def run(frames: list[Frame], m) -> np.ndarray:
         error = np.minimum(2.5 * np.maximum(misses, 0), energy)
         error = np.where(found, np.maximum(error, energy - s2 - most), 0)
         left = np.where(found, length_left("L", wide, q, energy, wide, h, m.light_change,
-                                           m.noise_threshold, np.zeros(shape)), 1e6)
+                                           m.noise_threshold), 1e6)
         noise = np.minimum(np.maximum(energy - s2 - error, energy / 4), most)
         noise = np.where(left < 2, np.minimum(spatial, energy), noise)
         noise = np.where(found, noise, spatial)

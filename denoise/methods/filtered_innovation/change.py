@@ -10,14 +10,14 @@ is worth its while: the noise N of a frame falls as 1 / n, the error of history,
 squared change D, does not. With
 
     r = min(l(S[e])^2, W) / max(l(S[e])^2, W),    c = 1 - k Q (1 - r^4) / D_0,
-    D_1 = max(c, 0)^2 D_0,                        D = min(D_2, W^2 / D_2),  D_2 = max(D_1, D_u),
+    D_1 = max(c, 0)^2 D_0,                        D = min(D_1, W^2 / D_1),
 
 D_0 is the largest square of l(S[e]), of its red and of half of its blue, those of diffuse light
 halved once more: its colours are over albedo, and noisy. What is as large all around as its mean is
 (r = 1: a shadow that is there at once) is no noise, however few pixels have told of it. And where
 the mean is far larger than what happens around (a quiet place near a change), it is none of the
-place's own. D_u is what unshadowed light tells (`inputs/light_change.py`): the square of the share
-of the light that has changed at once, times the greater of l(h) and l(h + S[e]).
+place's own. Of diffuse and glossy light n is at most 1 / `renewal`, too, where unshadowed light
+tells of a change (`inputs/light_change.py`).
 
 All of it is of the surroundings: were n of the pixel's own noise, a would go with it, and the mean
 of the history be off (3 % of energy too much with n of h itself).
@@ -27,8 +27,8 @@ on one that moves, light changes. Of visibility it is half of that, and four tim
 rays tell that shadow and surface stand still: near a contact S is of few rays, and has little else
 to tell there.
 
-Of a sparse signal D_u is 0, N is v (1 - v), D = max(c, 0)^2 (S[e] / S[omega])^2, and what is
-limited is the sum of omega.
+Of a sparse signal N is v (1 - v), D = max(c, 0)^2 (S[e] / S[omega])^2, and what is limited is the
+sum of omega.
 """
 
 # pyright: standard
@@ -47,7 +47,7 @@ from .layout import SignalLayout, Smoothed
 MIN_ENERGY = 1e-20             # square of a luminance that is taken for 0
 LEAST_NOISE = 0.01             # variance of a sample of visibility
 _LEAST_SHARE = 1 / 16          # of W that is noise
-GLOSSY_SAMPLES = 48.0          # W / Q of glossy light, whose Q is not known
+_GLOSSY_SAMPLES = 48.0         # W / Q of glossy light, whose Q is not known
 _AT_REST, _IN_MOTION = 4.0, 0.5  # times k, of visibility
 _COLOR = 0.25                  # share of squared red and blue, of diffuse light
 _BLUE = 0.25
@@ -61,16 +61,16 @@ def certainty(spread: Float, size: Float, threshold: Float) -> Float:
 
 class Doubts(NamedTuple):
     """What a change is judged by: k, of diffuse light on surfaces at rest and of all else; p of
-    each signal; and the share of the light that has changed at once."""
+    each signal; and `renewal`."""
 
     light_threshold: Float
     threshold: Float
     weights: list[Float]
-    sudden: Float
+    renewal: Float
 
 
-def lengths_left(layout: SignalLayout, signals: list[Signal], innovations: Innovations,
-                 smoothed: Smoothed, changes: list[Float], doubts: Doubts) -> list[Float]:
+def lengths_left(layout: SignalLayout, innovations: Innovations, smoothed: Smoothed,
+                 changes: list[Float], doubts: Doubts) -> list[Float]:
     """n of each signal, or N, that a change leaves at most; may be below 1.
 
     Args:
@@ -81,20 +81,18 @@ def lengths_left(layout: SignalLayout, signals: list[Signal], innovations: Innov
     for s, (kind, wide, p) in enumerate(
             zip(layout.kinds, smoothed.each, doubts.weights, strict=True)):
         group, follower, k = layout.group(s), layout.follower(s), doubts.threshold
-        known = None
         if kind is SignalKind.VISIBILITY:
             spread = next(spreads)
             k = doubts.threshold * (_IN_MOTION if follower is None else dr.fma(
                 innovations.unrest[follower], _IN_MOTION - _AT_REST, _AT_REST))
         elif kind is SignalKind.GLOSSY:
-            spread = smoothed.energies[s] / GLOSSY_SAMPLES
+            spread = smoothed.energies[s] / _GLOSSY_SAMPLES
         else:
             spread, k = smoothed.diffuse_spread, threshold_of_light(doubts, innovations.rests)
-        if kind is not SignalKind.VISIBILITY:
-            known = dr.square(known_change(
-                signals[s], innovations.signals[s], wide, doubts.sudden))
         if group is None:
-            left.append(_left(kind, wide, spread, smoothed.energies[s], k, p, known))
+            n = _left(kind, wide, spread, smoothed.energies[s], k, p)
+            left.append(n if kind is SignalKind.VISIBILITY
+                        else dr.minimum(n, 1 / dr.maximum(doubts.renewal, 1 / _KEPT)))
             continue
         certain = certainty(spread, dr.square(wide.luminance), k)
         size = dr.square(dr.maximum(certain, 0) * changes[group])
@@ -104,8 +102,8 @@ def lengths_left(layout: SignalLayout, signals: list[Signal], innovations: Innov
 
 
 def _left(kind: SignalKind, wide: Signal, spread: Float, energy: Float, threshold: Float,
-          p: Float, known: Float | None) -> Float:
-    """n of a signal that is not sparse; energy: W, known: D_u."""
+          p: Float) -> Float:
+    """n of a signal that is not sparse; energy: W."""
     luminance2 = size = dr.square(wide.luminance)
     if wide.red is not None and wide.blue is not None:
         color = dr.maximum(dr.square(wide.red), _BLUE * dr.square(wide.blue))
@@ -113,8 +111,6 @@ def _left(kind: SignalKind, wide: Signal, spread: Float, energy: Float, threshol
     agree = dr.minimum(luminance2, energy) / dr.maximum(dr.maximum(luminance2, energy), MIN_ENERGY)
     certain = certainty(spread * (1 - dr.square(dr.square(agree))), size, threshold)
     size = size * dr.square(dr.maximum(certain, 0))
-    if known is not None:
-        size = dr.maximum(size, known)
     size = dr.minimum(size, energy * (energy / dr.maximum(size, MIN_ENERGY)))
     noise = dr.maximum(energy - size, energy * _LEAST_SHARE)
     return dr.select(size > MIN_ENERGY, noise / dr.maximum(p * size, MIN_ENERGY), _KEPT)
@@ -123,12 +119,6 @@ def _left(kind: SignalKind, wide: Signal, spread: Float, energy: Float, threshol
 def threshold_of_light(doubts: Doubts, rests: Float) -> Float:
     """k of diffuse light; rests: of `Innovations`."""
     return dr.fma(doubts.light_threshold - doubts.threshold, rests, doubts.threshold)
-
-
-def known_change(signal: Signal, innovation: Signal, wide: Signal, share: Float) -> Float:
-    """A share of l(h) or l(h + S[e]), whichever is more."""
-    before = signal.luminance - innovation.luminance
-    return share * dr.maximum(dr.abs(before), dr.abs(before + wide.luminance))
 
 
 def coin_variance(visibility: Float) -> Float:

@@ -27,8 +27,8 @@ into a shadow that stands still. Where lights move, light changes everywhere: wi
 share of shadow rays that went to such, at most 1, g becomes g + m (1 - g), b / (1 - m) and
 k (1 - m / 2), and g' grows to 9/10. Where nothing moves, but the camera, and lights are known to be
 as they were (`inputs/light_change.py`), g is half of that. Where lights are known to have changed,
-all alike, h of diffuse and glossy light has changed with them before it is compared; and by what
-else they have changed at once, f of these is at least L / (L + Q) of that change (`change.py`).
+all alike, h of diffuse and glossy light has changed with them before it is compared; by what else
+they have changed at once, n is less (`change.py`).
 
     s^2 <- (1 - a)^2 s^2 + a^2 s_0^2,   s_0^2 = max(W[l(e)^2] - s^2, W[l(e)^2] / 4)
 

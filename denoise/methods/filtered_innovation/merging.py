@@ -17,12 +17,10 @@ from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import mapped
 
 from .change import (
-    GLOSSY_SAMPLES,
     MIN_ENERGY,
     Doubts,
     certainty,
     coin_variance,
-    known_change,
     lengths_left,
     threshold_of_light,
 )
@@ -89,7 +87,7 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
     first = [_only_sample(y, omega) for y, omega in zip(signals, omegas) if omega is not None]
     changes = [_change(wide.luminance, weight, sparse.history) for wide, weight, sparse in zip(
         smoothed.each[len(dense):], smoothed.weights, innovations.sparse, strict=True)]
-    left = lengths_left(layout, signals, innovations, smoothed, changes, gains.doubts)
+    left = lengths_left(layout, innovations, smoothed, changes, gains.doubts)
     lengths = list(innovations.lengths)
     for s in dense:
         lengths[layout.length(s)] = dr.minimum(lengths[layout.length(s)], left[s])
@@ -134,11 +132,6 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
             alpha = dr.maximum(alpha, turned)
             moves = dr.minimum(turned * (1 / _MOVING_IMAGE), 1)
             gain = gain * dr.fma(1 - OF_STILL_IMAGE, moves, OF_STILL_IMAGE)
-        if kind is not SignalKind.VISIBILITY:
-            spread = (smoothed.diffuse_spread if kind is SignalKind.DIFFUSE
-                      else smoothed.energies[s] / GLOSSY_SAMPLES)
-            gain = dr.maximum(gain, expected_gain(
-                known_change(signal, e, wide, gains.doubts.sudden), spread))
         if omega is None:
             a = dr.maximum(1 / lengths[layout.length(s)], alpha)
             energy = smoothed.energies[s]

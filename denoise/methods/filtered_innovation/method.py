@@ -388,7 +388,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         doubts = Doubts(stencil.opaque(threshold * (_LIGHTS_AT_REST if rests else 1)),
                         stencil.opaque(threshold),
                         [stencil.opaque(change[kind]) for kind in layout.kinds],
-                        stencil.opaque(lights.sudden))
+                        stencil.opaque(lights.renewal))
         return Gains([stencil.opaque(alpha) for alpha in alphas],
                      stencil.opaque(gain + m * (1 - gain)),
                      stencil.opaque(self.expected_change / max(1 - m, _LEAST_SHARE)),

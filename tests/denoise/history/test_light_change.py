@@ -42,7 +42,7 @@ def test_lights_that_all_change_alike_tell_by_how_much(camera):
     found = change(before, lit(lambda p: factor * lamp(-2)(p), camera=camera, seed=1))
     np.testing.assert_allclose(found.ratio, factor, rtol=0.02)
     assert found.left == pytest.approx(0, abs=0.02)
-    assert found.sudden == 0
+    assert found.renewal == 0
     assert not found.rests
 
 
@@ -62,10 +62,17 @@ def test_one_of_several_that_goes_off_leaves_a_change():
     share = [frame["unshadowed"][..., 1] / frame["albedo"][..., 1] for frame in (before, after)]
     found = change(before, after)
     assert found.ratio == (1, 1, 1)
-    assert found.left == pytest.approx(1 - share[1].sum() / share[0].sum(), abs=0.02)
-    assert found.sudden == pytest.approx((found.left - 0.2) / 0.8)
-    for off in (change(before, lit(lambda p: 0 * p)), change(lit(lambda p: 0 * p), before)):
-        assert off == LightChange(left=1.0)
+    assert found.left == pytest.approx(share[0].sum() / share[1].sum() - 1, abs=0.02)
+    x = found.left - 0.25
+    assert found.renewal == pytest.approx(x**2 / (x**2 + 1))
+    assert 0.1 < found.renewal < 0.9
+
+
+def test_of_light_that_goes_off_nothing_is_left_and_what_goes_on_was_dark():
+    dark, one = lit(lambda p: 0 * p), lit(lamp(-2))
+    assert change(one, dark).renewal > 1 - 1e-9
+    assert change(dark, one) == LightChange(left=1.0)
+    assert change(one, lit(lamp(-2, 0.02))).ratio == pytest.approx([0.02] * 3, rel=0.02)
 
 
 def test_of_lights_behind_walls_nothing_is_known():
@@ -73,7 +80,7 @@ def test_of_lights_behind_walls_nothing_is_known():
     before, after = lit(both(here, there), direct=here), lit(here, seed=1)
     assert change(before, after) == LightChange()
     assert not change(before, after).rests
-    assert change(before, after).sudden == 0
+    assert change(before, after).renewal == 0
 
 
 def test_objects_that_move_do_not_count():
