@@ -202,8 +202,8 @@ def locate(stencil: Stencil, surface: SurfaceSample, motion: Motion, plane_toler
     inside = (known & (scale > 1e-6) & (x >= 0) & (x < stencil.width)
               & (y >= 0) & (y < stencil.height))
     x, y = dr.select(inside, x, 0.5), dr.select(inside, y, 0.5)
-    moves = dr.isfinite(scale)  # the table has NaN, and the background reads of it, too
-    expected, plane = (Vector3(*[dr.select(moves, c, 0) for c in v])
+    is_known = dr.isfinite(scale)  # the table has NaN, and the background reads of it, too
+    expected, plane = (Vector3(*[dr.select(is_known, c, 0) for c in v])
                        for v in _turned(e, normal, motion.transforms))
     depth = depth * scale
     return Place(x, y, inside, float_t(id_), expected, dot(normal, normal) <= 0.25, plane,

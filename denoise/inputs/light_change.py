@@ -26,9 +26,9 @@ import numpy as np
 
 from onespp.denoise.geometry.cameras import camera_points, every
 from onespp.denoise.geometry.motion import at_rest
+from onespp.denoise.jit.color import LUMINANCE
 from onespp.render.frame import Frame
 
-LARGEST_RATIO = 1000.0
 _PLACES = 512              # that are looked at
 _FEWEST = 32               # that say something
 _SMALLEST_ALBEDO = 0.05
@@ -39,7 +39,7 @@ _DIFFERENT = 4 / 3         # times a gain, which is another one
 _RESTS = 0.05              # `left` of lights that have not changed
 _FOLLOWED = 0.25           # `left` that a smoothed innovation keeps up with
 _MOST_LEFT = 1e6
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_LARGEST_RATIO = 1000.0
 
 
 class LightSample(NamedTuple):
@@ -70,7 +70,7 @@ class LightChange(NamedTuple):
 
 
 def sample_light(frame: Frame) -> LightSample:
-    """What is kept of a frame with unshadowed and direct light for `light_change`."""
+    """What is kept of a frame with unshadowed and direct light for `change_of_lights`."""
     some = every(frame, _PLACES)
     id_, points = frame["id"][some, some], camera_points(frame, some)
     seen = (id_ >= 0) & (id_ < len(frame.world_from_object)) & np.isfinite(points).all(-1)
@@ -81,7 +81,7 @@ def sample_light(frame: Frame) -> LightSample:
                        _light(frame, first + step * row, first + step * column))
 
 
-def light_change(before: LightSample | None, previous: Frame, frame: Frame) -> LightChange:
+def change_of_lights(before: LightSample | None, previous: Frame, frame: Frame) -> LightChange:
     """The change since the frame before.
 
     Args:
@@ -129,7 +129,7 @@ def _change(old: np.ndarray, new: np.ndarray) -> LightChange:
         return LightChange(left=without)
     each = new / np.maximum(old, 1e-6 * weight.max())
     ratio = np.clip([_median(*both) for both in zip(each.T, weight.T, strict=True)],
-                    1 / LARGEST_RATIO, LARGEST_RATIO)
+                    1 / _LARGEST_RATIO, _LARGEST_RATIO)
     left = _left(old * ratio, new)
     if (np.abs(ratio - 1) < _SAME).all() or left > min(_UNEXPLAINED * without, _FOLLOWED):
         return LightChange(left=without)
@@ -138,19 +138,19 @@ def _change(old: np.ndarray, new: np.ndarray) -> LightChange:
 
 
 def _gain(old: np.ndarray, new: np.ndarray) -> float:
-    a, b = (float((light @ _LUMINANCE).sum()) for light in (old, new))
+    a, b = (float((light @ LUMINANCE).sum()) for light in (old, new))
     return b / a if a > 0 else 1.0
 
 
 def _apart(one: float, other: float) -> bool:
-    """Whether gains differ by more than a third; anything is little beyond `LARGEST_RATIO`."""
-    one, other = (min(max(gain, 1 / LARGEST_RATIO), LARGEST_RATIO) for gain in (one, other))
+    """Whether gains differ by more than a third; anything is little beyond `_LARGEST_RATIO`."""
+    one, other = (min(max(gain, 1 / _LARGEST_RATIO), _LARGEST_RATIO) for gain in (one, other))
     return max(one, other) > _DIFFERENT * min(one, other)
 
 
 def _left(old: np.ndarray, new: np.ndarray) -> float:
-    now = new @ _LUMINANCE
-    change = np.abs(old @ _LUMINANCE - now).sum()
+    now = new @ LUMINANCE
+    change = np.abs(old @ LUMINANCE - now).sum()
     return min(float(change / max(now.sum(), 1e-300)), _MOST_LEFT)
 
 

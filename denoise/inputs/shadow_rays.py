@@ -115,4 +115,3 @@ def share_of_moving_lights(previous: Frame, frame: Frame) -> float:
     moved = ~at_rest(previous, frame)
     lights = id_[(id_ >= 0) & (id_ < len(moved))].astype(int)
     return float(moved[lights].sum() / max(len(id_), 1))
-

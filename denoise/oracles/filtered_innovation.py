@@ -656,8 +656,8 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
             m = under_moving_lights(own, share)
         light_threshold = m.noise_threshold
         if previous is not None and lights.rests and share == 0:
-            light_threshold = 4 * m.noise_threshold
-            if np.array_equal(previous.world_from_object, frame.world_from_object):
+            light_threshold = np.where(at_rest(previous, frame), 4, 1) * m.noise_threshold
+            if objects_at_rest(previous, frame).all():
                 m = replace(m, min_gain=m.min_gain / 2)
         if "V" in signals:
             signals = {**signals, "V": of_lit_neighbours(frame, signals["V"], m)}
@@ -723,9 +723,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
             if sparse:
                 norm = norm_of(frame, here, found, smoothing, m, narrow)[..., None]
                 change = np.clip(h + norm * wide, -0.5, 2) - h
-            k = m.noise_threshold
-            if name == "L":
-                k = np.where(at_rest(previous, frame), light_threshold, k)
+            k = light_threshold if name == "L" else m.noise_threshold
             left = length_left(name, wide, q, energy, change, h, p, k, moving)
             if name in "LG":
                 left = np.minimum(left, 1 / max(lights.renewal, 1e-6))
@@ -747,9 +745,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
             follow = np.maximum(m.glossy_gain * (2 + np.minimum(30 * turn, 1)) / 3
                                 if "roughness" in frame else m.glossy_gain, alpha)
             if name != "G":
-                k = m.noise_threshold
-                if name == "L":
-                    k = np.where(at_rest(previous, frame), light_threshold, k)
+                k = light_threshold if name == "L" else m.noise_threshold
                 certain = 1 - k * q / np.maximum(lum(wide) ** 2, 1e-20)
                 expected = (m.expected_change * lum(h + wide)) ** 2
                 slow = m.min_gain * expected / np.maximum(expected + q, 1e-20)
@@ -800,13 +796,14 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
     return out
 
 
-def at_rest(previous: Frame | None, frame: Frame) -> np.ndarray:
+def objects_at_rest(previous: Frame, frame: Frame) -> np.ndarray:
+    return np.array([np.array_equal(*both) for both in zip(previous.world_from_object,
+                                                           frame.world_from_object)])
+
+
+def at_rest(previous: Frame, frame: Frame) -> np.ndarray:
     """Where the object has not moved."""
-    if previous is None:
-        return np.zeros(frame["id"].shape, bool)
-    still = [np.array_equal(*both) for both in zip(previous.world_from_object,
-                                                   frame.world_from_object)]
-    return (frame["id"] >= 0) & np.array(still)[frame["id"]]
+    return (frame["id"] >= 0) & objects_at_rest(previous, frame)[frame["id"]]
 
 
 def share_of_moving_lights(previous: Frame, frame: Frame) -> float:
@@ -814,9 +811,8 @@ def share_of_moving_lights(previous: Frame, frame: Frame) -> float:
     asked = np.abs(frame["light"]).sum(-1) > 0
     ids = frame["light_id"]
     known = asked & (ids >= 0) & (ids < len(frame.world_from_object))
-    moved = [not np.array_equal(*both) for both in zip(previous.world_from_object,
-                                                       frame.world_from_object)]
-    return min(2 * sum(moved[int(i)] for i in ids[known]) / max(asked.sum(), 1), 1)
+    moved = ~objects_at_rest(previous, frame)[ids[known].astype(int)]
+    return min(2 * moved.sum() / max(asked.sum(), 1), 1)
 
 
 def under_moving_lights(m, share: float):

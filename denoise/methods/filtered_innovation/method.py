@@ -35,7 +35,7 @@ from onespp.denoise.inputs.layers import surface_of_gloss
 from onespp.denoise.inputs.light_change import (
     LightChange,
     LightSample,
-    light_change,
+    change_of_lights,
     sample_light,
 )
 from onespp.denoise.inputs.shadow_rays import (
@@ -252,7 +252,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             (hit_distance,) = stencil.load(np.asarray(frame["hit_distance"], np.float32))
         change, lights = LightChange(), None
         if light.unshadowed:
-            change = light_change(state.lights, previous, frame)
+            change = change_of_lights(state.lights, previous, frame)
             lights = sample_light(frame)
         layout = self._layout(light, rays is not None, stencil)
         alone, away = light.texture.zero_albedo, None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from onespp.denoise.inputs.light_change import LightChange, light_change, sample_light
+from onespp.denoise.inputs.light_change import LightChange, change_of_lights, sample_light
 from tests.support.frames import make_frame, translation, with_images
 
 HEIGHT, WIDTH = 48, 64
@@ -32,7 +32,7 @@ def both(*lamps):
 
 
 def change(before, after):
-    return light_change(sample_light(before), before, after)
+    return change_of_lights(sample_light(before), before, after)
 
 
 @pytest.mark.parametrize("camera", [np.eye(4), translation(0.3, 0.1, 0.2)])
@@ -93,7 +93,7 @@ def test_objects_that_move_do_not_count():
 def test_nothing_is_known_of_places_that_are_not_seen_again():
     before = lit(lamp(-2))
     assert change(before, lit(lamp(-2), camera=translation(40, 0, 0))) == LightChange()
-    assert light_change(None, before, before) == LightChange()
+    assert change_of_lights(None, before, before) == LightChange()
     dark = with_images(before, unshadowed=0 * before["unshadowed"])
     assert change(dark, dark) == LightChange()
     nowhere = with_images(before, id=np.full((HEIGHT, WIDTH), -1))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from onespp.denoise.inputs.color import read_color
-from onespp.denoise.inputs.light_change import LightChange, light_change, sample_light
+from onespp.denoise.inputs.light_change import LightChange, change_of_lights, sample_light
 from onespp.denoise.inputs.signals import USED, read_signals
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.methods import base as lanes
@@ -211,7 +211,7 @@ def test_it_is_the_formula_in_float64(height, width, levels, sharp_levels, shado
 @pytest.mark.parametrize("still", [True, False])
 def test_it_is_the_formula_where_lights_are_as_they_were(still):
     frames = split(19, 26, 4, lobes=False, still=still, lamp=[0.7, 0.6, 0.5])
-    assert all(light_change(sample_light(one), one, other).rests
+    assert all(change_of_lights(sample_light(one), one, other).rests
                for one, other in pairwise(frames))
     method = FilteredInnovation(noise_threshold=0.5)  # so that some changes are believed
     image, _ = run(method, frames)
@@ -238,7 +238,7 @@ def test_a_lamp_that_dims_takes_its_history_along(monkeypatch):
     last, errors = shown_[-1], []
     for told in (True, False):
         if not told:
-            monkeypatch.setattr(innovation, "light_change", lambda *_: LightChange())
+            monkeypatch.setattr(innovation, "change_of_lights", lambda *_: LightChange())
         image, _ = run(FilteredInnovation(), shown_)
         image = image - last["emission"] - last["direct"] - lights[-1]
         errors.append(np.sqrt(np.square(image[last["id"] >= 0]).mean(0)) / (0.05 * factor))
@@ -358,7 +358,7 @@ def test_it_is_the_formula_where_light_goes_off(monkeypatch):
                                 sharp_innovation_levels=2, sharp_output_levels=2)
     image, _ = run(method, frames)
     np.testing.assert_allclose(image, innovation_oracle.run(frames, method), rtol=1e-3, atol=1e-5)
-    monkeypatch.setattr(innovation, "light_change", lambda *_: LightChange())
+    monkeypatch.setattr(innovation, "change_of_lights", lambda *_: LightChange())
     kept, _ = run(replace(method, light_change=0, glossy_change=0), frames)
     assert np.abs(image - kept).max() > 0.01
 

@@ -87,7 +87,7 @@ def test_glossy_light_goes_with_lamps_that_change_colour(monkeypatch):
 
     alone = decibels(run_alone(method, frames[-1:], method.init(HEIGHT, WIDTH)))
     known = decibels(run(method, frames, method.init(HEIGHT, WIDTH)))
-    monkeypatch.setattr(innovation, "light_change", lambda *_: LightChange())
+    monkeypatch.setattr(innovation, "change_of_lights", lambda *_: LightChange())
     unknown = decibels(run(method, frames, method.init(HEIGHT, WIDTH)))
     assert known > alone + 1
     assert known > unknown + 3
