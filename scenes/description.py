@@ -77,35 +77,27 @@ class Mesh:
     Attributes:
         vertices: (n, 3) float. faces: (m, 3) int, counter-clockwise from outside.
         normals: (n, 3) for smooth shading, None for flat. uv: (n, 2) or None.
+        attributes: other data, which materials show by {"type": "mesh_attribute", "name": ...}:
+            "vertex_NAME" of vertices, (n, 1) or (n, 3), interpolated between them; "face_NAME" of
+            faces, (m, 1) or (m, 3). Colours are linear.
 
     Raises:
         SceneError: shapes disagree, there is no face, something is not finite, a normal has no
-            length, or a face names a vertex that is not there.
+            length, a face names a vertex that is not there, or an attribute has no such name.
     """
 
     vertices: np.ndarray
     faces: np.ndarray
     normals: np.ndarray | None = None
     uv: np.ndarray | None = None
+    attributes: Mapping[str, np.ndarray] = field(default_factory=dict, metadata=LATER)
 
     def __post_init__(self) -> None:
         n = len(self.vertices) if isinstance(self.vertices, Sized) else 0
         for name, columns in (("vertices", 3), ("normals", 3), ("uv", 2)):
             array = getattr(self, name)
             if array is not None:
-                try:
-                    if np.iscomplexobj(array):
-                        raise TypeError
-                    array = np.array(array, np.float64)  # a copy: theirs may change
-                except (TypeError, ValueError):
-                    raise SceneError(f"mesh {name} are not real numbers in rows of {columns}"
-                                     ) from None
-                if array.shape != (n, columns):
-                    raise SceneError(f"mesh {name} have shape {array.shape}, "
-                                     f"expected ({n}, {columns})")
-                if not (abs(array) <= validity.LARGEST).all():
-                    raise SceneError(f"mesh {name} are not all finite: replace what is NaN, "
-                                     f"infinite, or above {validity.LARGEST:g}")
+                array = validity.rows(array, f"mesh {name}", n, columns)
                 object.__setattr__(self, name, array)
         try:
             faces = np.asarray(self.faces)
@@ -128,6 +120,8 @@ class Mesh:
                                  f"vertices, such as {without[0]}: give each a direction, or leave "
                                  "normals out")
         object.__setattr__(self, "faces", faces.astype(np.uint32))
+        object.__setattr__(self, "attributes",
+                           validity.attributes(self.attributes, n, len(faces)))
 
 
 Geometry = Sphere | Rectangle | Disk | Cylinder | Mesh
@@ -162,6 +156,8 @@ class Shape:
                              f"{validity.brief(self.geometry)}: use Sphere(), Rectangle(), Disk(), "
                              "Cylinder() or a Mesh")
         validity.material(self.material, f"the material of shape '{self.name}'")
+        validity.check_attributes(self.material, self.name, self.geometry.attributes if isinstance(
+            self.geometry, Mesh) else None)
         if not callable(self.world_from_object):
             place = validity.matrix(self.world_from_object, f"the place of shape '{self.name}'")
             object.__setattr__(self, "world_from_object", place)

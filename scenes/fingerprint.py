@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +62,7 @@ def _feed(digest: Any, value: Any, times: Sequence[float], names_a_file: bool = 
         value = array.tolist()
     if is_dataclass(value):
         for field in fields(value):
-            if field.metadata.get("later") and getattr(value, field.name) == field.default:
+            if field.metadata.get("later") and getattr(value, field.name) == _default(field):
                 continue
             _feed(digest, getattr(value, field.name), times)
     elif isinstance(value, Mapping):
@@ -76,6 +76,10 @@ def _feed(digest: Any, value: Any, times: Sequence[float], names_a_file: bool = 
             _feed(digest, item, times)
     else:
         digest.update(f"{value!r};".encode())
+
+
+def _default(field: Field) -> Any:
+    return field.default if field.default_factory is MISSING else field.default_factory()
 
 
 def _feed_file(digest: Any, path: Path) -> None:

@@ -7,6 +7,8 @@ otherwise. `merge` makes one object (one material, one ID) of several.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -108,24 +110,30 @@ def place(mesh: Mesh, matrix: Matrix) -> Mesh:
         normals = normals @ np.linalg.inv(linear)
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     faces = mesh.faces[:, ::-1] if np.linalg.det(linear) < 0 else mesh.faces
-    return Mesh(mesh.vertices @ linear.T + np.asarray(matrix)[:3, 3], faces, normals, mesh.uv)
+    return replace(mesh, vertices=mesh.vertices @ linear.T + np.asarray(matrix)[:3, 3], faces=faces,
+                   normals=normals)
 
 
 def merge(*meshes: Mesh) -> Mesh:
     """One mesh of several.
 
     Raises:
-        SceneError: nothing to merge, or only some of them have normals or uv.
+        SceneError: nothing to merge, or only some of them have normals, uv or an attribute.
     """
     if not meshes:
         raise SceneError("there are no meshes to merge")
-    parts: dict[str, np.ndarray | None] = {}
+    parts: dict[str, Any] = {}
     for name in ("normals", "uv"):
         arrays = [getattr(mesh, name) for mesh in meshes]
         given = [array for array in arrays if array is not None]
         if given and len(given) < len(arrays):
             raise SceneError(f"meshes to merge must all have {name}, or none of them")
         parts[name] = np.concatenate(given) if given else None
+    widths = [{name: a.shape[1] for name, a in mesh.attributes.items()} for mesh in meshes]
+    if any(width != widths[0] for width in widths):
+        raise SceneError("meshes to merge must all have the same attributes")
+    parts["attributes"] = {name: np.concatenate([mesh.attributes[name] for mesh in meshes])
+                           for name in meshes[0].attributes}
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
     faces = np.concatenate([mesh.faces.astype(np.int64) + start
                             for mesh, start in zip(meshes, starts)])
@@ -134,7 +142,7 @@ def merge(*meshes: Mesh) -> Mesh:
 
 def paint(mesh: Mesh, u: float, v: float = 0.5) -> Mesh:
     """The mesh with one uv throughout: the colour of `materials.palette` that is there."""
-    return Mesh(mesh.vertices, mesh.faces, mesh.normals, np.tile([u, v], (len(mesh.vertices), 1)))
+    return replace(mesh, uv=np.tile([u, v], (len(mesh.vertices), 1)))
 
 
 def box_mapped(mesh: Mesh) -> Mesh:
@@ -154,7 +162,14 @@ def box_mapped(mesh: Mesh) -> Mesh:
     inside = (vertices[of] - low) / longest
     uv = np.take_along_axis(inside, np.array([(2, 1), (0, 2), (0, 1)])[seen_along], axis=1)
     return Mesh(vertices[of], faces.reshape(-1, 3), None if mesh.normals is None
-                else mesh.normals[of], uv)
+                else mesh.normals[of], uv, attributes_of(mesh, of))
+
+
+def attributes_of(mesh: Mesh, vertices: Any = slice(None), faces: Any = slice(None),
+                  ) -> dict[str, np.ndarray]:
+    """The attributes of a mesh's vertices and faces, or of some, by number or mask."""
+    return {name: values[faces if name.startswith("face_") else vertices]
+            for name, values in mesh.attributes.items()}
 
 
 def _extent(size: Vector) -> np.ndarray:
@@ -200,8 +215,8 @@ def _without_slivers(mesh: Mesh) -> Mesh:
     """The mesh without triangles that have no area (at a pole or a crease)."""
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return Mesh(mesh.vertices, mesh.faces[area > 1e-12 * area.max()].astype(np.int64),
-                mesh.normals, mesh.uv)
+    kept = area > 1e-12 * area.max()
+    return replace(mesh, faces=mesh.faces[kept], attributes=attributes_of(mesh, faces=kept))
 
 
 def _profile_normals(points: np.ndarray) -> np.ndarray:

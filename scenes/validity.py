@@ -11,8 +11,9 @@ from __future__ import annotations
 import math
 import numbers
 import os
+import re
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,7 +35,13 @@ _FRACTIONS = frozenset((
 _NOT_NEGATIVE = frozenset(("alpha", "alpha_u", "alpha_v", "eta", "k", "specular",
                            "diff_trans"))
 _INDICES = frozenset(("int_ior", "ext_ior"))  # one is divided by the other
-_OF_A_TEXTURE = frozenset(("bitmap", "color0", "color1", "value"))  # as its property is bounded
+_OF_A_TEXTURE = frozenset((  # bounded as the texture's own property is
+    "bitmap", "color0", "color1", "value", "factor_0", "factor_1", "stepped"))
+_SCALARS = frozenset((  # of which Mitsuba reads one number
+    "opacity", "weight", "roughness", "metallic", "anisotropic", "spec_tint", "spec_trans", "sheen",
+    "sheen_tint", "clearcoat", "clearcoat_gloss", "flatness", "diff_trans", "alpha", "alpha_u",
+    "alpha_v"))
+BUFFERS = frozenset(("vertex_positions", "vertex_normals", "vertex_texcoords"))
 ENVIRONMENTS = ("envmap", "constant", "sunsky")
 LIGHTS = ("point", "spot", "directional")
 VECTORS = frozenset(("position", "direction", "sun_direction"))
@@ -157,6 +164,38 @@ def image(value: Any, what: str, bounds: Bounds = POSITIVE) -> np.ndarray:
     return found
 
 
+def rows(value: Any, what: str, count: int, *widths: int) -> np.ndarray:
+    """A copy of an array of finite real numbers, (count, one of the widths) float64."""
+    wide = " or ".join(map(str, widths))
+    try:
+        if np.iscomplexobj(value):
+            raise TypeError
+        found = np.array(value, np.float64)
+    except (TypeError, ValueError):
+        raise SceneError(f"{what} are not real numbers in rows of {wide}") from None
+    if found.shape not in [(count, width) for width in widths]:
+        raise SceneError(f"{what} have shape {found.shape}, expected ({count}, {wide})")
+    if not (abs(found) <= LARGEST).all():
+        raise SceneError(f"{what} are not all finite: replace what is NaN, infinite, or above "
+                         f"{LARGEST:g}")
+    return found
+
+
+def attributes(value: Any, vertices: int, faces: int) -> dict[str, np.ndarray]:
+    """Data of a mesh's vertices and faces, float64, in the order of their names."""
+    if not isinstance(value, Mapping):
+        raise SceneError(f"mesh attributes are {brief(value)}: use a dictionary, such as "
+                         "{'vertex_color': an (n, 3) array}")
+    for name in value:
+        if (not isinstance(name, str) or name in BUFFERS
+                or not re.fullmatch(r"(vertex|face)_\w+", name, re.ASCII)):
+            raise SceneError(f"a mesh attribute is named {brief(name)}: use vertex_ or face_ and a "
+                             "word, but not vertex_positions, vertex_normals or vertex_texcoords")
+    return {name: rows(part, f"the values of mesh attribute '{name}'",
+                       faces if name.startswith("face_") else vertices, 1, 3)
+            for name, part in sorted(value.items())}
+
+
 def material(value: Any, what: str) -> Mapping[str, Any]:
     """A BSDF dictionary all of whose values are of kinds that Mitsuba survives."""
     if not isinstance(value, Mapping):
@@ -175,6 +214,7 @@ def emission(value: Any, what: str) -> tuple[float, float, float] | np.ndarray |
             return emission(value["radiance"], what)
         if value.get("type") == "rgb":
             return color(value.get("value"), what, RADIANCE)
+        check_light(value, what)
         # A checkerboard's colours are reflectances for Mitsuba, whatever it is used for.
         _check_plugin(value, Place(what),
                       FRACTION if value.get("type") == "checkerboard" else RADIANCE, 0)
@@ -224,9 +264,56 @@ def _emitter(value: Mapping[str, Any], what: str) -> Mapping[str, Any]:
             matrix(part, str(place.inside(key)))
         elif key in VECTORS and _numbers(part, str(place.inside(key))).shape != (3,):
             raise SceneError(f"{place.inside(key)} is {brief(part)}: use three numbers")
+    check_light(value, what)
     _check_plugin({key: part for key, part in value.items()
                    if key not in VECTORS and key != "to_world"}, place, RADIANCE, 0)
     return value
+
+
+def check_light(value: Mapping[str, Any], what: str) -> None:
+    """SceneError where what is emitted is data of vertices: Mitsuba draws points of lamps without
+    the triangle that they are in, and such lamps light nothing."""
+    for place, *_ in _mesh_attributes(value, Place(what)):
+        raise SceneError(f"{place} is a mesh_attribute texture, and lights here cannot shine by "
+                         "data of vertices: use a colour or an image")
+
+
+def check_attributes(material: Mapping[str, Any], name: str,
+                     attributes: Mapping[str, np.ndarray] | None) -> None:
+    """SceneError where a material's mesh_attribute textures are of other data than a shape has:
+    Mitsuba shows black there.
+
+    Args:
+        name: the shape's. attributes: those of its mesh; None of what is no mesh.
+    """
+    for place, texture, key, bounds in _mesh_attributes(
+            material, Place(f"the material of shape '{name}'")):
+        asked = texture.get("name")
+        if attributes is None:
+            raise SceneError(f"{place} is the mesh_attribute {brief(asked)}, and shape '{name}' is "
+                             "no mesh: use a Mesh that has it, or another texture")
+        if not isinstance(asked, str) or asked not in attributes:
+            raise SceneError(f"{place} is the mesh_attribute {brief(asked)}, and the mesh of shape "
+                             f"'{name}' has {', '.join(attributes) or 'none'}: give it that "
+                             "attribute, or use another texture")
+        values, width = attributes[asked], 1 if key in _SCALARS else 3 if key == "normalmap" else 0
+        if width and values.shape[1] != width:
+            raise SceneError(f"{place} needs rows of {width}, and the attribute '{asked}' of shape "
+                             f"'{name}' has rows of {values.shape[1]}: use another one")
+        scale = number(texture.get("scale", 1.0), str(place.inside("scale")))
+        _within(scale * values, f"{place}, {scale:g} times the attribute '{asked}',", bounds)
+
+
+def _mesh_attributes(plugin: Mapping[Any, Any], place: Place, bounds: Bounds = ANY, key: str = "",
+                     ) -> Iterator[tuple[Place, Mapping[Any, Any], str, Bounds]]:
+    """The mesh_attribute textures in a dictionary: where, which, the property of a material that
+    they are of, and its bounds."""
+    if plugin.get("type") == "mesh_attribute":
+        yield place, plugin, key, bounds
+    for name, part in plugin.items():
+        if isinstance(part, Mapping):
+            yield from _mesh_attributes(part, place.inside(name), bounds_of(name, bounds),
+                                        key if name in _OF_A_TEXTURE else name)
 
 
 def _radiance(value: Any, what: str) -> tuple[float, float, float] | np.ndarray:

@@ -89,17 +89,18 @@ def _shapes(document: Document, accessors: Accessors, shown: list[Node]) -> tupl
             raise node.item.error("it has a skin, and meshes are rigid here: export without "
                                   "armatures, or with their motion as that of objects")
         for primitive in document.refer(node.item, "mesh", "meshes").parts("primitives"):
-            look = materials.look(primitive)
-            mesh = meshes.mesh(primitive, look.uv_set or 0)
+            colors = meshes.colors(primitive)
+            look = materials.look(primitive, colors)
+            mesh = meshes.mesh(primitive, look.uv_set or 0, look.colors)
             if mesh is None or look.material is None:
                 continue
             if look.uv_set is not None and mesh.uv is None:
                 raise primitive.error(f"its material has textures, and it has no TEXCOORD_"
                                       f"{look.uv_set}: unwrap it, or take the textures out")
-            sides = (meshes.by_side(primitive, look.uv_set or 0) if look.bumpy
+            sides = (meshes.by_side(primitive, look.uv_set or 0, look.colors) if look.bumpy
                      else [(False, mesh)])
             for left, mesh in sides:
-                look = materials.look(primitive, left != _mirrors(node.at(0)))
+                look = materials.look(primitive, colors, left != _mirrors(node.at(0)))
                 name = f"{node.name} mirrored" if left and len(sides) > 1 else node.name
                 parts.append((name, node, {
                     "geometry": mesh, "material": look.material, "emission": look.emission}))

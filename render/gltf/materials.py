@@ -5,23 +5,26 @@
     alphaMode MASK, BLEND                             mask: 0 or 1 by the cutoff, or alpha itself
 
 Both models shade by GGX of alpha = roughness^2 with an F0 of 0.04 (or by `KHR_materials_ior`) and
-tint metals by the base colour; the diffuse lobe is Disney's, not Lambert's. Both sides of every
-surface are shaded: nothing is culled. Emission is radiance as it is: factor times texture times
-`KHR_materials_emissive_strength`, of that share of the surface that its alpha leaves.
+tint metals by the base colour; the diffuse lobe is Disney's, not Lambert's. Colours of vertices
+multiply base colour and alpha. Both sides of every surface are shaded: nothing is culled. Emission
+is radiance as it is: factor times texture times `KHR_materials_emissive_strength`, of that share of
+the surface that its alpha leaves (not that of vertices).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from onespp.render.mitsuba.textures import PRODUCT, STEP
 from onespp.scenes.validity import brief
 
 from .document import Document
 from .item import Item
+from .meshes import ALPHA, COLOR
 from .textures import Texture, Textures
 
 _IOR = 1.5
@@ -35,13 +38,14 @@ class Look:
         material: None where it is not there at all (alpha below its cutoff).
         emission: None, (r, g, b), or a texture's dictionary. uv_set: that its textures need, None
             where it has no textures.
-        bumpy: whether it has a normal map.
+        bumpy: whether it has a normal map. colors: which of its mesh's it needs (`COLOR`, `ALPHA`).
     """
 
     material: dict[str, Any] | None
     emission: Any
     uv_set: int | None
     bumpy: bool
+    colors: tuple[str, ...]
 
 
 class Materials:
@@ -49,19 +53,25 @@ class Materials:
 
     def __init__(self, document: Document) -> None:
         self._document, self._textures = document, Textures(document)
-        self._made: dict[tuple[str, bool, bool], Look] = {}
+        self._made: dict[Any, Look] = {}
 
-    def look(self, primitive: Item, left: bool = False) -> Look:
-        """What a primitive looks like. left: where a normal map's frame is left-handed."""
+    def look(self, primitive: Item, colors: Collection[str] = (), left: bool = False) -> Look:
+        """What a primitive looks like.
+
+        Args:
+            colors: names of those that its vertices have. left: where a normal map's frame is
+                left-handed.
+        """
         item = (self._document.refer(primitive, "material", "materials")
                 if "material" in primitive else Item({}, "", primitive.file))
         own = "TANGENT" in primitive.part("attributes")
-        key = (item.path, left, own) if "normalTexture" in item else (item.path, False, False)
+        key = (item.path, *((left, own) if "normalTexture" in item else (False, False)),
+               frozenset(colors))
         if key not in self._made:
-            self._made[key] = self._look(item, left, own)
+            self._made[key] = self._look(item, colors, left, own)
         return self._made[key]
 
-    def _look(self, item: Item, left: bool, own_tangents: bool) -> Look:
+    def _look(self, item: Item, colors: Collection[str], left: bool, own_tangents: bool) -> Look:
         pbr = item.part("pbrMetallicRoughness")
         base = self._textures.texture(pbr, "baseColorTexture", color=True)
         rough = self._textures.texture(pbr, "metallicRoughnessTexture")
@@ -86,10 +96,19 @@ class Materials:
             self._document.leave(volume, "what a volume absorbs")
         solid = volume.number("thicknessFactor", 0, 0) > 0
         opacity = _opacity(item, base, float(factor[3]))
+        emission, shown = self._emission(item, shining, opacity), []
+        if COLOR in colors:
+            surface["base_color"] = _by_vertices(surface["base_color"], COLOR)
+            shown.append(COLOR)
+        if ALPHA in colors and item.text("alphaMode", "OPAQUE") != "OPAQUE":
+            opacity = _opacity(item, base, float(factor[3]), by_vertices=True)
+            shown.append(ALPHA)
+            if emission is not None:
+                self._document.leave(item, "alpha of vertices in emission")
         material = _covered(opacity, _material(
             surface, solid, _normal_map(item, bumps, left, own_tangents)))
-        return Look(material, self._emission(item, shining, opacity), self._uv_set(
-            item, base, rough, bumps, shining, clear), bumps is not None)
+        return Look(material, emission, self._uv_set(item, base, rough, bumps, shining, clear),
+                    bumps is not None, tuple(shown))
 
     def _emission(self, item: Item, shining: Texture | None, opacity: Any) -> Any:
         factor = item.numbers("emissiveFactor", (0, 0, 0), 0)
@@ -153,22 +172,38 @@ def _material(surface: dict[str, Any], solid: bool,
             "bsdf_1": {"type": "twosided", "bsdf": shaded(metal)}}
 
 
-def _opacity(item: Item, base: Texture | None, factor: float) -> Any:
-    """What alpha leaves of a surface: a number or a texture's dictionary."""
+def _by_vertices(value: Any, name: str) -> Any:
+    """A number, a colour or a texture's dictionary, times an attribute of the mesh."""
+    attribute = {"type": "mesh_attribute", "name": name}
+    if isinstance(value, dict) or (np.ndim(value) and len(set(value)) > 1):
+        return {"type": PRODUCT, "factor_0": value, "factor_1": attribute}
+    return attribute | {"scale": float(np.max(value))}
+
+
+def _opacity(item: Item, base: Texture | None, factor: float, by_vertices: bool = False) -> Any:
+    """What alpha leaves of a surface: a number or a texture's dictionary.
+
+    by_vertices: alpha of vertices leaves less.
+    """
     mode = item.text("alphaMode", "OPAQUE")
     if mode not in ("OPAQUE", "MASK", "BLEND"):
         raise item.error(f"its alphaMode is {brief(mode)}: there are OPAQUE, MASK and BLEND")
     if mode == "OPAQUE":
         return 1.0
     opacity = _values(base, slice(3, 4), factor)
+    by_vertices = by_vertices and opacity != 0
     if mode == "MASK":
         cutoff = item.number("alphaCutoff", 0.5, 0)
+        if by_vertices:
+            if isinstance(opacity, dict):
+                opacity = opacity | {"filter_type": "nearest"}
+            return {"type": STEP, "stepped": _by_vertices(opacity, ALPHA), "at_least": cutoff}
         if isinstance(opacity, dict):
             # Between two texels there is no half a hole.
             return opacity | {"bitmap": (opacity["bitmap"] >= cutoff).astype(np.float32),
                               "filter_type": "nearest"}
         return float(opacity >= cutoff)
-    return opacity
+    return _by_vertices(opacity, ALPHA) if by_vertices else opacity
 
 
 def _covered(opacity: Any, material: dict[str, Any]) -> dict[str, Any] | None:

@@ -1,19 +1,27 @@
 """Primitives of a file's meshes as triangles: lists, strips and fans, with indices or without.
 
+Colours of vertices are linear and multiply the base colour. White ones are as if there were none.
+
 A normal map's frame has t along u and b upwards in the picture, against v. Where b is n x t it is
 right-handed, as Mitsuba's is; where the picture lies mirrored it is left-handed.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from onespp.render.scene_files.geometry import with_lengths
 from onespp.scenes.description import Mesh, SceneError
+from onespp.scenes.meshes import attributes_of
 
 from .accessors import Accessors
 from .document import Document
 from .item import Item
+
+COLOR, ALPHA = "vertex_color", "vertex_alpha"
+"""Attributes of meshes: (n, 3) and (n, 1)."""
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _ALONG = 0.7      # cosine: less is another direction
@@ -25,26 +33,40 @@ class Meshes:
 
     def __init__(self, document: Document, accessors: Accessors) -> None:
         self._document, self._accessors = document, accessors
-        self._made: dict[tuple[str, int], Mesh | None] = {}
+        self._made: dict[tuple[str, int, tuple[str, ...]], Mesh | None] = {}
 
-    def mesh(self, primitive: Item, uv_set: int) -> Mesh | None:
+    def colors(self, primitive: Item) -> dict[str, np.ndarray]:
+        """The colours of a primitive's vertices: `COLOR`, `ALPHA`, or what of these is not 1."""
+        attributes = primitive.part("attributes")
+        if "COLOR_1" in attributes:
+            self._document.leave(attributes, "second colours of vertices")
+        if "COLOR_0" not in attributes:
+            return {}
+        values = self._accessors.floats(attributes, "COLOR_0", "VEC3 VEC4")
+        values = np.clip(np.nan_to_num(values), 0, 1)
+        return {name: part for name, part in ((COLOR, values[:, :3]), (ALPHA, values[:, 3:]))
+                if (part != 1).any()}
+
+    def mesh(self, primitive: Item, uv_set: int, shown: Sequence[str] = ()) -> Mesh | None:
         """The triangles of a primitive, None where it has none.
 
         Args:
             uv_set: which of its texture coordinates, from 0; there may be none.
+            shown: which of its `colors` it takes along.
 
         Raises:
             SceneError: a form that cannot be rendered here, or damaged.
         """
-        key = (primitive.path, uv_set)
+        key = (primitive.path, uv_set, tuple(shown))
         if key not in self._made:
-            self._made[key] = self._read(primitive, uv_set)
+            self._made[key] = self._read(primitive, uv_set, shown)
         return self._made[key]
 
-    def by_side(self, primitive: Item, uv_set: int) -> list[tuple[bool, Mesh]]:
+    def by_side(self, primitive: Item, uv_set: int,
+                shown: Sequence[str] = ()) -> list[tuple[bool, Mesh]]:
         """The triangles of a primitive with texture coordinates, in parts on which a normal map's
         frame is right-handed (False) and left-handed (True)."""
-        mesh, attributes = self.mesh(primitive, uv_set), primitive.part("attributes")
+        mesh, attributes = self.mesh(primitive, uv_set, shown), primitive.part("attributes")
         if mesh is None:
             return []
         tangents = None
@@ -60,7 +82,7 @@ class Meshes:
             return [(bool(left[0]), mesh)]
         return [(side, _part(mesh, left == side)) for side in (False, True)]
 
-    def _read(self, primitive: Item, uv_set: int) -> Mesh | None:
+    def _read(self, primitive: Item, uv_set: int, shown: Sequence[str]) -> Mesh | None:
         if primitive.extension("KHR_draco_mesh_compression").value:
             raise primitive.error("its mesh is compressed: export without compression of meshes")
         if primitive.parts("targets"):
@@ -72,8 +94,6 @@ class Meshes:
             self._document.leave(primitive, "points and lines" if mode < _TRIANGLES
                                  else "meshes without positions")
             return None
-        if "COLOR_0" in attributes:
-            self._document.leave(primitive, "colours of vertices")
         vertices = self._accessors.floats(attributes, "POSITION", "VEC3", whole=True)
         order = (self._accessors.indices(primitive, "indices") if "indices" in primitive
                  else np.arange(len(vertices)))
@@ -90,16 +110,18 @@ class Meshes:
         if (name := f"TEXCOORD_{uv_set}") in attributes:
             uv = self._accessors.floats(attributes, name, "VEC2", whole=True)
             uv = np.where(np.isfinite(uv), uv, 0)
-        for array in (normals, uv):
+        colors = self.colors(primitive) if shown else {}
+        for array in (normals, uv, *colors.values()):
             if array is not None and len(array) != len(vertices):
-                raise attributes.error(f"it has {len(vertices)} positions and {len(array)} normals "
-                                       "or texture coordinates: export the file again")
+                raise attributes.error(f"it has {len(vertices)} positions and {len(array)} "
+                                       "normals, texture coordinates or colours: export the file "
+                                       "again")
         if not np.isfinite(vertices).all():
             raise attributes.error("a position is not finite: export the file again")
         if normals is not None:
             normals = with_lengths(normals, vertices, faces)
         try:
-            return Mesh(vertices, faces, normals, uv)
+            return Mesh(vertices, faces, normals, uv, {name: colors[name] for name in shown})
         except SceneError as error:
             raise primitive.error(str(error)) from None
 
@@ -144,8 +166,9 @@ def _are_elsewhere(mesh: Mesh, tangents: np.ndarray) -> bool:
 def _part(mesh: Mesh, faces: np.ndarray) -> Mesh:
     """Some of a mesh's faces, with the vertices they have."""
     used, numbers = np.unique(mesh.faces[faces], return_inverse=True)
-    return Mesh(mesh.vertices[used], numbers.reshape(-1, 3),
-                *(None if array is None else array[used] for array in (mesh.normals, mesh.uv)))
+    normals, uv = (None if array is None else array[used] for array in (mesh.normals, mesh.uv))
+    return Mesh(mesh.vertices[used], numbers.reshape(-1, 3), normals, uv,
+                attributes_of(mesh, used, faces))
 
 
 def _area(mesh: Mesh) -> np.ndarray:

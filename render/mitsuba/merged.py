@@ -8,6 +8,7 @@ its object IDs: they are looked up by the number of the face that a ray hit.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -22,18 +23,19 @@ def groups(scene: Scene) -> list[list[Shape]]:
              and not shape.moves and shape.emission is None]
     if len(still) <= MANY:
         return []
-    found: dict[tuple[int, bool, bool], list[Shape]] = {}
+    found: dict[Any, list[Shape]] = {}
     for shape in still:
         mesh = shape.geometry
         assert isinstance(mesh, Mesh)
-        found.setdefault((id(shape.material), mesh.normals is None, mesh.uv is None),
+        widths = tuple((name, data.shape[1]) for name, data in mesh.attributes.items())
+        found.setdefault((id(shape.material), mesh.normals is None, mesh.uv is None, widths),
                          []).append(shape)
     return [group for group in found.values() if len(group) > 1]
 
 
 def joined(parts: Sequence[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
     """Buffers of several meshes as those of one: (n, 3) positions and normals, (n, 2) uv, (m, 3)
-    faces."""
+    faces, (n or m, k) attributes."""
     starts = np.cumsum([0] + [len(part["vertex_positions"]) for part in parts[:-1]])
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     whole["faces"] = np.concatenate([part["faces"] + np.uint32(start)

@@ -25,7 +25,7 @@ from onespp.scenes import validity
 from onespp.scenes.description import SceneError
 from onespp.scenes.validity import Place
 
-from . import pictured_lamps
+from . import pictured_lamps, textures
 from .variant import mi
 
 _SPECIAL = ("rgb", "spectrum")  # textures that are no plugins but forms of a value
@@ -194,8 +194,10 @@ def _survivable(value: Mapping[str, Any], what: str) -> None:
         if len(inner) != 2 or "weight" not in value:
             raise SceneError(f"{what} is a blendbsdf of {len(inner)} materials: give it two, and "
                              "a weight")
-    if kind in ("volume", "mesh_attribute"):
-        raise SceneError(f"{what} is a {kind} texture, and shapes here carry no such data: use an "
+    if missing := [name for name in textures.NEEDED.get(kind, ()) if name not in value]:
+        raise SceneError(f"{what} is a {kind} without a \"{missing[0]}\": give it one")
+    if kind == "volume":
+        raise SceneError(f"{what} is a volume texture, and shapes here carry no such data: use an "
                          "image, or onespp.scenes.materials.palette")
 
 
@@ -216,6 +218,8 @@ def _read(filename: Any, what: str, bounds: validity.Bounds) -> np.ndarray:
 
 
 def _kind(name: str) -> Any:
+    if name in textures.KINDS:
+        return mi.ObjectType.Texture
     return mi.PluginManager.instance().plugin_type(name)
 
 
@@ -253,6 +257,10 @@ def plain(error: Exception | str) -> str:
     said = " ".join(str(error).split())
     said = re.sub(r"^\[parser\.cpp:\d+\] (At|While loading) dictionary node \"[^\"]*\": ", "", said)
     said = re.sub(r"\[[\w.]+?(:\d+)?\] ?", "", said)
+    said = re.sub(r"Texture::\w+\(\): not implemented!|nanobind\S+: tried to call a pure virtual "
+                  r"function", "textures of data of vertices, such as a mesh_attribute, cannot be "
+                  "there", said)
+    said = "".join(letter if letter.isprintable() else "?" for letter in said)  # of damaged files
     return said.rstrip(".! ")[:400]
 
 
@@ -278,7 +286,7 @@ def _instead(kind: str, name: str) -> str:
 _BSDFS = ("blendbsdf", "bumpmap", "conductor", "dielectric", "diffuse", "hair", "mask", "measured",
           "normalmap", "null", "plastic", "principled", "principledthin", "roughconductor",
           "roughdielectric", "roughplastic", "thindielectric", "twosided")
-_TEXTURES = ("bitmap", "checkerboard", "rgb", "spectrum", "uniform")
+_TEXTURES = ("bitmap", "checkerboard", "mesh_attribute", "rgb", "spectrum", "uniform")
 _PROPERTIES = {"reflectance", "diffuse_reflectance", "specular_reflectance", "base_color", "alpha",
                "specular_transmittance", "int_ior", "ext_ior", "distribution", "material",
                "nonlinear", "roughness", "metallic", "opacity", "raw", "wrap_mode", "filter_type",

@@ -31,10 +31,12 @@ from onespp.scenes.description import (
     Shape,
     Sphere,
 )
+from onespp.scenes.validity import BUFFERS
 
 from . import merged, pictured_lamps, plugins
 from .appearance import Appearance
 from .images import Images, only_mirrors
+from .textures import Meshes
 from .variant import check_variant, mi
 
 _SMALL = 0.125   # a scene that reaches less far has a unit of its own
@@ -69,6 +71,7 @@ class MitsubaScene:
                           for shape in description.shapes}
         self._ids = {name: f"shape_{i:06d}" for i, name in enumerate(description.object_names)}
         self._bsdfs: dict[int, Any] = {}
+        self._meshes = Meshes()
         scene: dict[str, Any] = {"type": "scene"}
         together = merged.groups(description)
         alone = {shape.name for shape in description.shapes} - {
@@ -223,7 +226,7 @@ class MitsubaScene:
 
     def _load_shape(self, shape: Shape, frame: float) -> Any:
         emission = shape.emission_at(frame)
-        parts = {"bsdf": self._bsdf(shape)}
+        parts = {"bsdf": self._bsdf(shape, self._ids[shape.name])}
         if emission is not None:
             parts["emitter"] = plugins.area_light(emission, f"the emission of shape '{shape.name}'")
         local = self._local(shape.world_from_object_at(frame))
@@ -232,32 +235,55 @@ class MitsubaScene:
         return {"type": _ANALYTIC[type(shape.geometry)], "flip_normals": shape.geometry.flipped,
                 "to_world": mi.ScalarTransform4f(_checked(shape, local).tolist()), **parts}
 
-    def _bsdf(self, shape: Shape) -> Any:
-        """What a shape is made of; shapes that have one material have one BSDF."""
+    def _bsdf(self, shape: Shape, name: str) -> Any:
+        """What a shape is made of; shapes that have one material have one BSDF.
+
+        name: of its mesh, whose data a material may show: then the BSDF is its own.
+        """
+        what = f"the material of shape '{shape.name}'"
+        own = self._meshes.material(shape.material, name)
+        if own is not shape.material:
+            return plugins.bsdf(own, what)
         key = id(shape.material)  # alive as long as the description is
         if key not in self._bsdfs:
-            self._bsdfs[key] = plugins.bsdf(shape.material, f"the material of shape '{shape.name}'")
+            self._bsdfs[key] = plugins.bsdf(shape.material, what)
         return self._bsdfs[key]
 
     def _load_mesh(self, shape: Shape, local: np.ndarray, parts: dict[str, Any]) -> mi.Mesh:
         geometry = shape.geometry
         assert isinstance(geometry, Mesh)
         buffers = _buffers(geometry, local)
-        mesh = _built(self._ids[shape.name], buffers, _properties(parts))
+        mesh = self._built(self._ids[shape.name], buffers, parts)
         emitter = parts.get("emitter")
         if (emitter is not None
                 and mi.has_flag(emitter.flags(), mi.EmitterFlags.SpatiallyVarying)
                 and not pictured_lamps.is_found(mesh, geometry)):
             parts["emitter"] = plugins.area_light(
                 shape.emission_at(0), f"the emission of shape '{shape.name}'", by_area=True)
-            return _built(self._ids[shape.name], buffers, _properties(parts))
+            return self._built(self._ids[shape.name], buffers, parts)
         return mesh
 
     def _load_merged(self, name: str, group: Sequence[Shape]) -> mi.Mesh:
         """Still meshes of one material as one."""
-        return _built(name, merged.joined([
+        return self._built(name, merged.joined([
             _buffers(cast(Mesh, shape.geometry), self._local(shape.world_from_object_at(0)))
-            for shape in group]), _properties({"bsdf": self._bsdf(group[0])}))
+            for shape in group]), {"bsdf": self._bsdf(group[0], name)})
+
+    def _built(self, name: str, buffers: dict[str, np.ndarray], parts: dict[str, Any]) -> mi.Mesh:
+        properties = mi.Properties()
+        for key, part in parts.items():
+            properties[key] = part
+        mesh = mi.Mesh(name, len(buffers["vertex_positions"]), len(buffers["faces"]), properties,
+                       "vertex_normals" in buffers, "vertex_texcoords" in buffers)
+        for key, value in buffers.items():
+            if key not in BUFFERS and key != "faces":
+                mesh.add_attribute(key, value.shape[1], [0.0] * value.size)
+        parameters = mi.traverse(mesh)
+        for key, value in buffers.items():
+            parameters[key] = _jit(value)
+        parameters.update()
+        self._meshes[name] = mesh
+        return mesh
 
     def _place(self, shape: Shape, world_from_object: np.ndarray) -> None:
         local = self._local(world_from_object)
@@ -353,24 +379,8 @@ def _placed(mesh: Mesh, matrix: np.ndarray) -> dict[str, np.ndarray]:
 
 def _buffers(mesh: Mesh, matrix: np.ndarray) -> dict[str, np.ndarray]:
     """All buffers of a mesh at a place."""
-    return ({} if mesh.uv is None else {"vertex_texcoords": mesh.uv}) | _placed(mesh, matrix)
-
-
-def _properties(parts: dict[str, Any]) -> mi.Properties:
-    properties = mi.Properties()
-    for name, part in parts.items():
-        properties[name] = part
-    return properties
-
-
-def _built(name: str, buffers: dict[str, np.ndarray], properties: Any) -> mi.Mesh:
-    mesh = mi.Mesh(name, len(buffers["vertex_positions"]), len(buffers["faces"]), properties,
-                   "vertex_normals" in buffers, "vertex_texcoords" in buffers)
-    parameters = mi.traverse(mesh)
-    for key, value in buffers.items():
-        parameters[key] = _jit(value)
-    parameters.update()
-    return mesh
+    own = dict(mesh.attributes) | ({} if mesh.uv is None else {"vertex_texcoords": mesh.uv})
+    return own | _placed(mesh, matrix)
 
 
 def _cofactors(linear: np.ndarray) -> np.ndarray:

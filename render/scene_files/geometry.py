@@ -30,6 +30,7 @@ from onespp.scenes.description import (
     Sphere,
 )
 from onespp.scenes.transforms import scale, translate
+from onespp.scenes.validity import BUFFERS
 
 from .document import Node
 
@@ -55,11 +56,15 @@ class Piece:
 
 
 class _File(NamedTuple):
-    """A mesh as a file and its options give it. flipped: it faces the other way."""
+    """A mesh as a file and its options give it. flipped: it faces the other way.
+
+    attributes: of its data of vertices and faces, those that are asked for.
+    """
 
     plugin: str
     options: tuple[tuple[str, Any], ...]
     flipped: bool = False
+    attributes: tuple[str, ...] = ()
 
 
 class Geometries:
@@ -108,10 +113,10 @@ class Geometries:
         flipped = options.pop("flip_normals", False)
         if node.plugin != "cube":
             options["filename"] = str(node.path())
-        file = _File(node.plugin, tuple(options.items()), bool(flipped))
+        file = _File(node.plugin, tuple(options.items()), bool(flipped), _shown(node))
         try:
             return self._made(file, self._turn(file, node.matrix()[:3, :3]))
-        except (RuntimeError, SceneError) as error:
+        except (RuntimeError, UnicodeDecodeError, SceneError) as error:
             raise node.error(f"this {node.plugin} cannot be used: {plain(error)}") from None
 
     def _made(self, file: _File, turn: np.ndarray) -> Mesh:
@@ -144,7 +149,7 @@ def mesh_of_file(path: Path) -> Mesh:
     """
     try:
         return _read(_File(path.suffix.lower()[1:], (("filename", str(path)),)), _AS_IT_IS)
-    except (RuntimeError, SceneError) as error:
+    except (RuntimeError, UnicodeDecodeError, SceneError) as error:
         raise SceneError(f"{path} cannot be used as a mesh: {plain(error)}") from None
 
 
@@ -169,7 +174,33 @@ def _read(file: _File, turn: np.ndarray) -> Mesh:
         normals = normals if turn is _AS_IT_IS else normals @ turn
         normals = -normals if file.flipped else normals
     turned = file.flipped ^ bool(np.linalg.det(turn) < 0)
-    return Mesh(vertices, faces[:, ::-1] if turned else faces, normals, uv)
+    return Mesh(vertices, faces[:, ::-1] if turned else faces, normals, uv, {
+        name: _attribute(name, np.array(arrays[name]),
+                         len(faces if name.startswith("face_") else vertices))
+        for name in file.attributes if name in arrays})
+
+
+def _attribute(name: str, values: np.ndarray, count: int) -> np.ndarray:
+    """(count, 1 or 3) values of vertices or faces."""
+    width = values.size // count
+    if width not in (1, 3):  # Mitsuba shows black
+        raise SceneError(f"its attribute '{name}' has rows of {width}, and textures show rows of 1 "
+                         "or 3: save it again so, colours without alpha")
+    return values.reshape(count, width)
+
+
+def _shown(node: Node) -> tuple[str, ...]:
+    """The attributes that materials in a shape's node show."""
+    found: set[str] = set()
+    left = node.parts("bsdf")
+    while left:
+        part = left.pop()
+        name = part.values.get("name")
+        if (part.plugin == "mesh_attribute" and isinstance(name, str) and name not in BUFFERS
+                and name.startswith(("vertex_", "face_"))):
+            found.add(name)
+        left += part.parts("bsdf", "texture")
+    return tuple(sorted(found))
 
 
 def with_lengths(normals: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -226,7 +257,7 @@ _Z_UP = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]])
 def _turned(mesh: Mesh, flipped: bool) -> Mesh:
     if not flipped or mesh.normals is None:
         return mesh
-    return Mesh(mesh.vertices, mesh.faces[:, ::-1], -mesh.normals, mesh.uv)
+    return replace(mesh, faces=mesh.faces[:, ::-1], normals=-mesh.normals)
 
 
 def turned_to(z: np.ndarray) -> np.ndarray:

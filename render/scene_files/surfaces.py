@@ -18,7 +18,7 @@ from .document import Node
 _REFUSED = {
     "hair": "fibres", "polarizer": "polarisation", "retarder": "polarisation",
     "circular": "polarisation", "measured_polarized": "polarisation",
-    "bsdf_wrapper": "what it wraps", "volume": "volumes", "mesh_attribute": "data of vertices"}
+    "bsdf_wrapper": "what it wraps", "volume": "volumes"}
 _EMPTY = np.full((2, 2, 3), 0.5)
 
 
@@ -128,6 +128,7 @@ def emitted(value: Any, surfaces: Surfaces, node: Node) -> Any:
     if value is not None and value["type"] == "bitmap":
         return value
     try:
+        validity.check_light(value or {}, "its radiance")
         loaded = plugins.area_light(value, "its radiance") if value else mi.load_dict(
             {"type": "area"})
     except SceneError as error:

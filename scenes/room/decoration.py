@@ -5,6 +5,8 @@ Things face +z. What hangs on a wall lies in the xy plane, what swings has its a
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from onespp.scenes.description import Mesh
@@ -70,7 +72,7 @@ def pictures(openings: list[tuple[float, float, float, float]]) -> Mesh:
         canvas = surface(grid)
         assert canvas.uv is not None
         uv = (canvas.uv + np.array((i, 0))) * (1 / len(openings), 1)
-        parts.append(Mesh(canvas.vertices, canvas.faces, canvas.normals, uv))
+        parts.append(replace(canvas, uv=uv))
     return merge(*parts)
 
 

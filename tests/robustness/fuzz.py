@@ -39,14 +39,16 @@ from onespp.render.files.times import read_times
 from onespp.render.games202.convert import export_games202, import_games202, read_mat
 from onespp.render.gltf.gltf import load_gltf
 from onespp.render.references import References
+from onespp.render.scene_files.mitsuba_xml import load_xml
 from onespp.render.tracer.reference import SampleSums
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 from onespp.scenes.description import SceneError
 from tests.cli.test_command import SCENE
-from tests.support.gltf_scenes import lit, moving
+from tests.support.gltf_scenes import lit, moving, painted
 from tests.support.report_sequence import make_report_sequence
 from tests.support.small_sequence import small_sequence
+from tests.support.xml_scenes import painted as painted_xml
 
 MEMORY, SECONDS = 4 << 30, 10.0
 _INTEGERS = (0, 1, -1, 2, 7, 255, 65535, 65536, 10**6, 2**31 - 1, -2**31)
@@ -162,6 +164,10 @@ def _scene(folder: Path) -> Path:
     return folder / "scene.py"
 
 
+def _ply(folder: Path) -> Path:
+    return painted_xml(folder).with_name("ball.ply")
+
+
 READERS = {
     "exr": Reader(_exr, _read_exr),
     "manifest": Reader(lambda f: small_sequence(f, (0,)).folder / "manifest.json",
@@ -177,6 +183,8 @@ READERS = {
     "scores": Reader(_scored, _read_scores, "json"),
     "times": Reader(_times, _read_times, "json"),
     "gltf": Reader(lambda f: lit(f)[0], lambda p: load_gltf(p), "json"),
+    "gltf-colors": Reader(lambda f: painted(f)[0], lambda p: load_gltf(p), "json"),
+    "ply": Reader(_ply, lambda p: load_xml(p.with_name("painted.xml"))),
     "glb": Reader(lambda f: moving(f)[0], lambda p: load_gltf(p)),
     "scene": Reader(_scene, lambda p: catalog.load(str(p)), "text"),
 }

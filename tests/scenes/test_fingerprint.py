@@ -63,6 +63,11 @@ PAIRS = {
     "faces": (block(), block(faces=INWARD[:, ::-1])),
     "normals": (block(), block(normals=-CORNERS)),
     "uv": (block(), block(uv=CORNERS[:, 1:])),
+    "colours of vertices": (block(), block(attributes={"vertex_color": CORNERS})),
+    "their values": (block(attributes={"vertex_color": CORNERS}),
+                     block(attributes={"vertex_color": -CORNERS})),
+    "their name": (block(attributes={"vertex_a": CORNERS}),
+                   block(attributes={"vertex_b": CORNERS})),
     "image": (textured(bitmap=np.zeros((2, 2, 3))), textured(bitmap=np.ones((2, 2, 3)))),
     "an image of Mitsuba": tuple(textured(bitmap=mi.Bitmap(np.full((2, 2, 3), v, np.float32)))
                                  for v in (0.2, 0.3)),
@@ -85,6 +90,16 @@ def test_the_same_scene_built_again_has_the_same_fingerprint():
     for build in (small_scene, block, lambda: textured(bitmap=np.full((2, 2, 3), 0.25)),
                   lambda: textured(bitmap=mi.Bitmap(np.ones((2, 2, 3), np.float32)))):
         assert fingerprint(build()) == fingerprint(build())
+
+
+def test_meshes_without_attributes_have_the_fingerprint_they_had_before_there_were_any():
+    assert fingerprint(block()) == fingerprint(block(attributes={})) == "b8fab0b3dd7d65a6"
+
+
+def test_attributes_have_no_order():
+    a, b = ("vertex_a", CORNERS), ("vertex_b", -CORNERS)
+    assert fingerprint(block(attributes=dict((a, b)))) == fingerprint(
+        block(attributes=dict((b, a))))
 
 
 @pytest.mark.parametrize("kind", [str, lambda path: path])

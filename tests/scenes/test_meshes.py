@@ -1,6 +1,7 @@
 """Laws of the meshes made in code."""
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -127,6 +128,23 @@ def test_paint_moves_all_uv_to_one_place_and_nothing_else():
     assert np.array_equal(painted.vertices, mesh.vertices)
 
 
+def colored(mesh: Mesh) -> Mesh:
+    """By place, and faces by the place of their middle."""
+    return replace(mesh, attributes={"vertex_color": mesh.vertices,
+                                     "face_color": corners(mesh).mean(1)})
+
+
+@pytest.mark.parametrize("made", [
+    place(colored(box((1, 2, 3))), scale((-1, -1, -1))), paint(colored(box((1, 2, 3))), 0.5),
+    box_mapped(colored(ellipsoid((1, 2, 3), 8))),
+    merge(colored(box((1, 2, 3))), colored(ellipsoid((1, 1, 1), 8)))], ids=[
+        "mirrored", "painted", "box-mapped", "merged"])
+def test_attributes_stay_with_their_vertices_and_faces(made):
+    mirror = -1 if np.isclose(made.vertices, -made.attributes["vertex_color"]).all() else 1
+    np.testing.assert_allclose(made.attributes["vertex_color"], mirror * made.vertices)
+    np.testing.assert_allclose(made.attributes["face_color"], mirror * corners(made).mean(1))
+
+
 @pytest.mark.parametrize(("make", "words"), [
     (lambda: box((1, 0, 1)), "three positive numbers"),
     (lambda: rounded_box((1, 1, 1), 0.6), "at most 0.5"),
@@ -134,6 +152,7 @@ def test_paint_moves_all_uv_to_one_place_and_nothing_else():
     (lambda: lathe([(1, 0), (-1, 1)]), "below 0"),
     (lambda: surface(np.zeros((1, 5, 3))), "at least 2 x 2"),
     (lambda: merge(), "no meshes"),
+    (lambda: merge(box((1, 1, 1)), colored(box((1, 1, 1)))), "the same attributes"),
     (lambda: merge(box((1, 1, 1)), Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]]))), "none of them"),
 ])
 def test_impossible_mesh_is_refused_in_one_sentence(make, words):

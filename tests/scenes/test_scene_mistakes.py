@@ -57,6 +57,10 @@ def refused(make, *words: str) -> None:
         assert word in said, said
 
 
+def triangle(**attributes) -> Mesh:
+    return Mesh(np.eye(3), np.array([[0, 1, 2]]), None, None, attributes)
+
+
 # Names
 
 
@@ -88,7 +92,6 @@ def test_a_name_that_cannot_be_written_is_refused(name):
     ({"type": "normalmap", "normalmap": np.ones((4, 4)), "b": bare()}, ["'x'", "monochromatic"]),
     (bare(reflectance="#ff8800"), ["'x'", "reflectance", "string"]),
     (bare(reflectance={"type": "volume"}), ["'reflectance'", "volume"]),
-    (bare(reflectance={"type": "mesh_attribute", "name": "vertex_color"}), ["mesh_attribute"]),
 ])
 def test_what_mitsuba_does_not_take_is_named(material, words):
     refused(lambda: MitsubaScene(scene(material)), *words)
@@ -171,6 +174,43 @@ def test_materials_that_killed_the_process_are_refused():
                           capture_output=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("SAID") == len(DEADLY), done.stdout
+
+
+COLOR = {"type": "mesh_attribute", "name": "vertex_color"}
+
+
+@pytest.mark.parametrize(("material", "words"), [
+    (diffuse({**COLOR, "name": "vertex_colour"}), ["'vertex_colour'", "has face_w, vertex_color"]),
+    (diffuse({**COLOR, "name": 3.0}), ["mesh_attribute 3.0"]),
+    (diffuse({"type": "mesh_attribute"}), ["mesh_attribute None"]),
+    (diffuse({**COLOR, "scale": 2.0}), ["2 times the attribute 'vertex_color'", "0 to 1"]),
+    (diffuse({**COLOR, "scale": -1.0}), ["-1 times", "0 to 1"]),
+    (diffuse({**COLOR, "scale": "much"}), ["scale'", "'much'"]),
+    ({"type": "principled", "roughness": COLOR}, ["'roughness' of", "needs rows of 1", "of 3"]),
+    ({"type": "normalmap", "normalmap": {**COLOR, "name": "face_w"}, "b": bare()},
+     ["'normalmap' of", "needs rows of 3", "'face_w'", "of 1"]),
+    ({"type": "mask", "b": bare(), "opacity": {
+        "type": "onespp_product", "factor_0": 0.5, "factor_1": COLOR}},
+     ["'opacity.factor_1'", "needs rows of 1"])])
+def test_data_that_a_mesh_does_not_have_are_refused_by_name(material, words):
+    mesh = triangle(vertex_color=np.eye(3), face_w=[[0.5]])
+    refused(lambda: Shape("x", mesh, material), "material of shape 'x'", *words)
+
+
+@pytest.mark.parametrize("geometry", [Rectangle(), Sphere(), triangle()])
+def test_data_of_vertices_are_of_meshes_that_have_them(geometry):
+    refused(lambda: Shape("x", geometry, diffuse(COLOR)), "mesh_attribute 'vertex_color'",
+            "shape 'x'", "has none" if isinstance(geometry, Mesh) else "is no mesh")
+
+
+@pytest.mark.parametrize("make", [
+    lambda: Shape("x", triangle(vertex_color=np.eye(3)), GRAY, np.eye(4), COLOR),
+    lambda: Light({"type": "spot", "texture": COLOR}),
+    lambda: Light({"type": "directional", "irradiance": COLOR}),
+    lambda: scene(environment={"type": "sunsky", "albedo": COLOR})])
+def test_lights_do_not_shine_by_data_of_vertices(make):
+    """Mitsuba's own path, at a lamp like that, has a hundredth of its light."""
+    refused(make, "mesh_attribute", "use a colour or an image")
 
 
 # 8-bit pictures
@@ -320,6 +360,13 @@ def test_values_in_image_files_are_checked_too(tmp_path):
     (lambda: Mesh(np.eye(3), [[0, 1, 2]], [[0, 0, 1], [0, 0, 0], [0, 0, 1]]),
      ["no length at 1 of 3", "as 1:"]),
     (lambda: Mesh(np.eye(3), [[0, 1, -1]]), ["-1"]),
+    (lambda: triangle(vertex_color=np.eye(2)), ["'vertex_color'", "(2, 2)", "(3, 1 or 3)"]),
+    (lambda: triangle(face_color=np.eye(3)), ["'face_color'", "(1, 1 or 3)"]),
+    (lambda: triangle(vertex_color=np.full((3, 3), np.nan)), ["'vertex_color'", "not all finite"]),
+    (lambda: triangle(vertex_color=[[1], [1, 2], [3]]), ["'vertex_color'", "rows of 1 or 3"]),
+    (lambda: triangle(color=np.eye(3)), ["'color'", "use vertex_ or face_"]),
+    (lambda: triangle(vertex_normals=np.eye(3)), ["'vertex_normals'", "but not"]),
+    (lambda: Mesh(np.eye(3), [[0, 1, 2]], None, None, 7), ["attributes are 7", "dictionary"]),
     (lambda: Shape("x", Sphere, GRAY), ["'x'", "Sphere()"]),
     (lambda: Shape("x", Sphere(), GRAY, np.eye(3)), ["'x'", "4x4"]),
     (lambda: Shape("x", Sphere(), GRAY, translate((1, 2, 3)).T), ["'x'", "last row"]),

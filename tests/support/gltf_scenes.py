@@ -248,6 +248,72 @@ def lit(folder: Path) -> Made:
                 "to_world": _transform(toward[2])}})
 
 
+def painted(folder: Path) -> Made:
+    """Colours of vertices of all types: alone, with factors, with a picture, as holes and veils.
+
+    Over a quad they are affine in u and v, so that pictures of the same are known.
+    """
+    w, rng = Writer(), np.random.default_rng(4)
+    colors = np.round(rng.uniform(0.1, 0.9, (6, 8, 3)) * 255) / 255
+    write_png(folder / "colors b.png", colors)
+    w.put("textures", {"source": w.put("images", {"uri": "colors%20b.png"})})
+
+    def affine(alpha: tuple[float, float, float] | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """(4, 3 or 4) at the corners and (64, 64, ...) as a picture."""
+        at = rng.uniform(0.3, 0.7, 3), rng.uniform(-0.25, 0.25, 3), rng.uniform(-0.25, 0.25, 3)
+        c, across, down = at if alpha is None else (np.append(a, b) for a, b in zip(at, alpha))
+        middle = (np.arange(64) + 0.5) / 64
+        return (c + QUAD_UV[:, :1] * across + QUAD_UV[:, 1:] * down,
+                c + middle[None, :, None] * across + middle[:, None, None] * down)
+
+    def quad(name: str, place: Matrix, material: int, corners: Any, dtype: str = "float32") -> None:
+        most = 1 if dtype == "float32" else np.iinfo(dtype).max
+        attributes = {"TEXCOORD_0": w.array(QUAD_UV)}
+        if corners is not None:
+            attributes["COLOR_0"] = w.array(np.round(corners * most) if most > 1 else corners,
+                                            dtype, normalized=most > 1)
+        w.placed(place, name=name, mesh=w.mesh(w.array(QUAD), material, attributes=attributes,
+                                               indices=w.array([0, 1, 2, 0, 2, 3], "uint16")))
+
+    tinted, papered, holes, veil = (w.grey(alphaMode=mode) for mode in (
+        "OPAQUE", "OPAQUE", "MASK", "BLEND"))
+    factors = [(1, 0.8, 0.6), (1, 0.9, 0.8), (GREY,) * 3, (1, 1, 1)]
+    for material, factor in zip((tinted, papered, holes, veil), factors):
+        w.json["materials"][material]["pbrMetallicRoughness"]["baseColorFactor"] = [*factor, 1]
+    w.json["materials"][papered]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
+    w.json["materials"][holes]["alphaCutoff"] = 0.375
+    floor, pane, leaf, veiled = affine(), affine(), affine((0, 1, 0)), affine((0.2, 0.3, 0.4))
+    quad("floor", _FLOOR, papered, floor[0])
+    quad("pane", _PANE, tinted, pane[0], "uint16")
+    quad("plain", _PLAIN, tinted, None)
+    quad("leaf", _LEAF, holes, leaf[0])
+    quad("veil", _VEIL, veil, veiled[0], "uint8")
+    quad("lamp", _LAMP, w.grey(emissiveFactor=[1, 1, 1], extensions={
+        "KHR_materials_emissive_strength": {"emissiveStrength": LAMP[0]}}), None)
+    w.placed(EYE, camera=0)
+
+    def surface(base: np.ndarray) -> dict[str, Any]:
+        return {"type": "twosided", "bsdf": {"type": "principled", "base_color": _bitmap(
+            base, wrap_mode="clamp"), "roughness": 1.0, "metallic": 0.0}}
+
+    # Fine enough that the picture, interpolated between its texels, is the product of both.
+    u, v = ((np.arange(n) + 0.5) / n * k - 0.5 for n, k in ((512, 8), (384, 6)))
+    p = _between(_linear(colors), v, u)
+    fine = np.stack([floor[0][0, i] + (np.arange(512) + 0.5)[None] / 512 * (
+        floor[0][1] - floor[0][0])[i] + (np.arange(384) + 0.5)[:, None] / 384 * (
+        floor[0][3] - floor[0][0])[i] for i in range(3)], -1)
+    return w.gltf(folder / "painted.gltf"), 0, _scene(EYE, {
+        "floor": _shape("rectangle", _FLOOR, bsdf=surface(p * fine * factors[1])),
+        "pane": _shape("rectangle", _PANE, bsdf=surface(pane[1] * factors[0])),
+        "plain": _shape("rectangle", _PLAIN, bsdf=_principled(factors[0])),
+        "leaf": _shape("rectangle", _LEAF, bsdf={"type": "mask", "opacity": _bitmap(
+            (leaf[1][..., 3:] >= 0.375).astype(float), filter_type="nearest"),
+            "bsdf": surface(GREY * leaf[1][..., :3])}),
+        "veil": _shape("rectangle", _VEIL, bsdf={"type": "mask", "opacity": _bitmap(
+            veiled[1][..., 3:], wrap_mode="clamp"), "bsdf": surface(veiled[1][..., :3])}),
+        "lamp": _shape("rectangle", _LAMP, (LAMP[0],) * 3)})
+
+
 SCENES: dict[str, Callable[[Path], Made]] = {"moving": moving, "pictured": pictured, "lit": lit}
 
 _FLOOR = rotate((1, 0, 0), -90) @ scale(3)
@@ -255,6 +321,7 @@ _LAMP = translate((0, 3, 0)) @ rotate((1, 0, 0), 90) @ scale((0.8, 0.6, 1))
 _LEAF = translate((-0.8, 0.7, 0.2)) @ rotate((0, 1, 0), 30) @ scale(0.6)
 _VEIL = translate((0.9, 0.8, 0.5)) @ rotate((0, 1, 0), -20) @ scale(0.5)
 _PANE = translate((0, 0.8, -0.8)) @ scale(0.7)
+_PLAIN = translate((1.6, 0.5, -0.9)) @ rotate((0, 1, 0), -30) @ scale(0.5)
 _BOXES = (translate((-0.7, 0.4, 0)) @ scale(0.4),
           translate((0.8, 0.5, -0.5)) @ rotate((0, 1, 0), 25) @ scale((-0.3, 0.5, 0.3)))
 _LIGHTS = (translate((-1, 2, 1.5)), translate((1.5, 3, 0.5)) @ rotate((1, 0, 0), -80),
@@ -287,6 +354,17 @@ def _quaternion(matrix: Matrix) -> tuple[float, float, float, float]:
 
 def _linear(srgb: np.ndarray) -> np.ndarray:
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+def _between(pixels: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """A picture that repeats, at (rows x columns) places between its texels, whose middles are
+    whole numbers."""
+    for axis, at in enumerate((rows, columns)):
+        low, size = np.floor(at).astype(int), pixels.shape[axis]
+        share = (at - low).reshape([-1 if i == axis else 1 for i in range(3)])
+        pixels = ((1 - share) * np.take(pixels, low % size, axis)
+                  + share * np.take(pixels, (low + 1) % size, axis))
+    return pixels
 
 
 def _rgb(color: Any) -> dict[str, Any]:

@@ -6,6 +6,7 @@ are 48x32; what is tiny in them stands for what is large in the scenes that they
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -292,6 +293,52 @@ def metals(folder: Path) -> Path:
     return path
 
 
+def painted(folder: Path) -> Path:
+    """PLY meshes with colours of vertices and of faces, and with a roughness of vertices."""
+    rng = np.random.default_rng(5)
+    ball, block = meshes.ellipsoid((0.5, 0.5, 0.5), 16), meshes.box((0.7, 0.7, 0.7))
+    write_ply(folder / "ball.ply", replace(ball, attributes={
+        "vertex_color": rng.uniform(0.05, 0.95, (len(ball.vertices), 3)),
+        "vertex_rough": rng.uniform(0.1, 0.5, (len(ball.vertices), 1))}))
+    write_ply(folder / "block.ply", replace(block, attributes={
+        "face_color": rng.uniform(0.05, 0.95, (len(block.faces), 3))}))
+    path = folder / "painted.xml"
+    path.write_text(HEAD.format(depth=5, origin="0.4, 1.6, 3.2", target="0, 0.5, 0",
+                                fov='<float name="fov" value="45"/>') + """
+  <bsdf type="diffuse" id="faces"><texture type="mesh_attribute" name="reflectance">
+    <string name="name" value="face_color"/></texture></bsdf>
+  <shape type="ply" id="ball"><string name="filename" value="ball.ply"/>
+    <transform name="to_world"><scale x="-1"/><translate x="-0.6" y="0.5"/></transform>
+    <bsdf type="twosided"><bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance">
+      <string name="name" value="vertex_color"/><float name="scale" value="0.8"/></texture>
+    </bsdf></bsdf></shape>
+  <shape type="ply" id="block"><string name="filename" value="block.ply"/>
+    <boolean name="face_normals" value="true"/><ref id="faces"/>
+    <transform name="to_world"><rotate y="1" angle="35"/><translate x="0.7" y="0.35"/></transform>
+  </shape>
+  <shape type="ply" id="metal"><string name="filename" value="ball.ply"/>
+    <transform name="to_world"><translate x="0.1" y="0.5" z="-1"/></transform>
+    <bsdf type="roughconductor"><string name="distribution" value="ggx"/>
+      <texture type="mesh_attribute" name="alpha">
+        <string name="name" value="vertex_rough"/></texture>
+      <texture type="mesh_attribute" name="specular_reflectance">
+        <string name="name" value="vertex_color"/></texture></bsdf></shape>
+  <shape type="shapegroup" id="small"><shape type="ply">
+    <string name="filename" value="block.ply"/><boolean name="flip_normals" value="true"/>
+    <bsdf type="twosided"><ref id="faces"/></bsdf></shape></shape>
+  <shape type="instance"><ref id="small"/><transform name="to_world"><scale value="0.4"/>
+    <translate x="-0.2" y="0.14" z="0.9"/></transform></shape>
+  <shape type="rectangle" id="ground"><transform name="to_world"><scale value="4"/>
+    <rotate x="1" angle="-90"/></transform></shape>
+  <shape type="rectangle" id="lamp"><transform name="to_world"><rotate x="1" angle="90"/>
+      <translate y="3"/></transform>
+    <emitter type="area"><rgb name="radiance" value="9, 8, 7"/></emitter></shape>
+  <emitter type="constant"><rgb name="radiance" value="0.2"/></emitter>
+</scene>
+""")
+    return path
+
+
 SCENES = {"indoor": indoor, "glass": glass, "foliage": foliage, "many": many, "lights": lights,
           "metals": metals}
 
@@ -333,9 +380,18 @@ def write_quad(path: Path, uv: int = 1) -> None:
 
 
 def write_ply(path: Path, mesh: Mesh) -> None:
+    """With its attributes, called as Mitsuba does: what is `vertex_color` there is r, g and b."""
+    names: dict[str, list[str]] = {"vertex": [], "face": []}
+    rows = {"vertex": [mesh.vertices], "face": [np.full((len(mesh.faces), 1), 3), mesh.faces]}
+    for name, values in mesh.attributes.items():
+        kind, _, word = name.partition("_")
+        rows[kind].append(values)
+        names[kind] += [f"property float {part}" for part in (
+            "rgb" if word == "color" else [f"{word}_{i}" for i in range(values.shape[1])])]
     path.write_text("\n".join([
         "ply", "format ascii 1.0", f"element vertex {len(mesh.vertices)}",
-        *(f"property float {axis}" for axis in "xyz"), f"element face {len(mesh.faces)}",
-        "property list uchar int vertex_indices", "end_header",
-        *(f"{x} {y} {z}" for x, y, z in mesh.vertices),
-        *(f"3 {a} {b} {c}" for a, b, c in mesh.faces), ""]))
+        *(f"property float {axis}" for axis in "xyz"), *names["vertex"],
+        f"element face {len(mesh.faces)}", "property list uchar int vertex_indices",
+        *names["face"], "end_header",
+        *(" ".join(f"{x}" for part in row for x in part) for kind in ("vertex", "face")
+          for row in zip(*rows[kind])), ""]))

@@ -16,18 +16,19 @@ from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import SceneError
 from tests.support import brightness
-from tests.support.gltf_scenes import EYE, QUAD, SCENES, Made, Writer, lit, moving
+from tests.support.gltf_scenes import EYE, QUAD, SCENES, Made, Writer, lit, moving, painted
 
-SPP = {"moving": 64, "pictured": 128, "lit": 64}
+FILES = SCENES | {"painted": painted}
+SPP = {"moving": 64, "pictured": 128, "lit": 64, "painted": 64}
 
 
-@pytest.fixture(scope="module", params=list(SCENES))
+@pytest.fixture(scope="module", params=list(FILES))
 def made(request, tmp_path_factory) -> tuple[str, Made]:
-    return request.param, SCENES[request.param](tmp_path_factory.mktemp(request.param))
+    return request.param, FILES[request.param](tmp_path_factory.mktemp(request.param))
 
 
 @pytest.mark.parametrize("made", [
-    "moving", "lit", pytest.param("pictured", marks=pytest.mark.slow)], indirect=True)
+    "moving", "lit", "painted", pytest.param("pictured", marks=pytest.mark.slow)], indirect=True)
 def test_a_scene_is_as_bright_as_mitsubas(made):
     name, (path, frame, theirs) = made
     brightness.assert_as_bright(*brightness.means(

@@ -22,7 +22,7 @@ from onespp.scenes.description import LONGEST_PATH, SceneError
 from onespp.scenes.fingerprint import fingerprint
 from tests.support import brightness
 from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
-from tests.support.xml_scenes import SCENES, write_png, write_quad
+from tests.support.xml_scenes import SCENES, painted, write_png, write_quad
 
 
 def scene_xml(inside: str, sensor: str = '<float name="fov" value="50"/>', depth: int = 3,
@@ -56,10 +56,11 @@ def means(path: Path, spp: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("name", [
-    *("indoor", "glass", "foliage", "lights"),
+    *("indoor", "glass", "foliage", "lights", "painted"),
     *(pytest.param(name, marks=pytest.mark.slow) for name in ("many", "metals"))])
 def test_a_scene_is_as_bright_as_mitsubas(name: str, tmp_path: Path):
-    brightness.assert_as_bright(*means(SCENES[name](tmp_path), spp=64))
+    write = (SCENES | {"painted": painted})[name]
+    brightness.assert_as_bright(*means(write(tmp_path), spp=64))
 
 
 @pytest.mark.parametrize("name", [
@@ -382,6 +383,42 @@ def test_a_changed_mesh_or_picture_is_another_scene(tmp_path: Path):
     assert len({first, second, fingerprint(load_xml(path).scene, [0])}) == 3
 
 
+def ply(path: Path, attributes: str, *rows: str) -> None:
+    path.write_text(f"""ply\nformat ascii 1.0\nelement vertex 3\nproperty float x
+property float y\nproperty float z\n{attributes}element face 1
+property list uchar int vertex_indices\nend_header\n""" + "".join(
+        f"{i % 2} {i // 2} 0 {row}\n" for i, row in enumerate(rows)) + "3 0 1 2\n")
+
+
+@pytest.mark.parametrize(("kind", "names", "row", "sentence"), [
+    ("float", "rgba", "1 0 0 1", r"line 8, column \d+: this ply cannot be used: its attribute "
+                                 "'vertex_color' has rows of 4, and textures show rows of 1 or 3"),
+    ("uchar", "rgb", "255 0 0", "1 times the attribute 'vertex_color', holds 255: use 0 to 1"),
+    ("float", "rgb", "2e30 0 0", "this ply cannot be used: the values of mesh attribute "
+                                "'vertex_color' are not all finite"),
+    ("float", ("s_0", "s_1", "s_2"), "1 0 0", "and the mesh of shape 'a' has none")])
+def test_colours_of_a_ply_that_cannot_be_shown_are_told(kind: str, names, row: str, sentence: str,
+                                                        tmp_path: Path):
+    ply(tmp_path / "a.ply", "".join(f"property {kind} {name}\n" for name in names), *[row] * 3)
+    path = written(tmp_path, scene_xml(SHAPE.format(
+        "ply", f'<string name="filename" value="a.ply"/>{COLORED}')))
+    with pytest.raises(SceneError, match=sentence) as caught:
+        load_xml(path)
+    assert str(caught.value).startswith(f"scene file '{path}', line 8")
+
+
+def test_data_that_no_material_shows_are_not_of_the_scene(tmp_path: Path):
+    """So that a sequence from before they were read goes on."""
+    found = []
+    for attributes, rows in (("", [""] * 3), ("".join(
+            f"property float {name}\n" for name in ("r", "g", "b")), ["0.2 0.3 0.4"] * 3)):
+        ply(tmp_path / "a.ply", attributes, *rows)
+        for bsdf in ("", COLORED) if attributes else ("",):
+            found.append(fingerprint(load_xml(written(tmp_path, scene_xml(SHAPE.format(
+                "ply", f'<string name="filename" value="a.ply"/>{bsdf}')))).scene, [0]))
+    assert found[0] == found[1] != found[2]
+
+
 def test_a_shape_of_a_file_may_be_given_a_motion(tmp_path: Path):
     scene = load_xml(written(tmp_path, scene_xml(GROUND + BALL + SKY))).scene
     moving = dataclasses.replace(scene, shapes=tuple(
@@ -392,6 +429,8 @@ def test_a_shape_of_a_file_may_be_given_a_motion(tmp_path: Path):
     assert not np.array_equal(frame.world_from_object[0], np.diag([0.5, 0.5, 0.5, 1]))
 
 
+COLORED = ('<bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance">'
+           '<string name="name" value="vertex_color"/></texture></bsdf>')
 SHAPE = '<shape type="{}">{}</shape>' + SKY
 
 
@@ -425,6 +464,20 @@ SHAPE = '<shape type="{}">{}</shape>' + SKY
                             "</bsdf>")), "'reflectance' of this diffuse holds 2: use 0 to 1"),
     (scene_xml(SHAPE.format("sphere", '<bsdf type="hair"/>')), "a hair cannot be rendered here"),
     (scene_xml(SHAPE.format("sphere", '<bsdf type="polarizer"/>')), "nothing of polarisation"),
+    (scene_xml(SHAPE.format("sphere", COLORED)),
+     r"line 8, column \d+: 'reflectance' of the material of shape 'sphere' is the mesh_attribute "
+     "'vertex_color', and shape 'sphere' is no mesh"),
+    (scene_xml(SHAPE.format("cube", COLORED)), "and the mesh of shape 'cube' has none: give it"),
+    (scene_xml(SHAPE.format("cube", COLORED.replace("vertex_color", "vertex_positions"))),
+     "and the mesh of shape 'cube' has none: give it"),
+    (scene_xml(SHAPE.format("cube", COLORED.replace("vertex_color", "color"))),
+     r"line 8, column \d+: this diffuse is not one that Mitsuba takes: .*attribute name"),
+    (scene_xml(SHAPE.format("cube", COLORED.replace('"diffuse"', '"plastic"').replace(
+        "reflectance", "diffuse_reflectance"))), "this plastic is not one that Mitsuba takes: "
+     ".*textures of data of vertices, such as a mesh_attribute, cannot be there"),
+    (scene_xml(SHAPE.format("cube", COLORED.replace('bsdf', 'emitter').replace(
+        '"diffuse"', '"area"').replace("reflectance", "radiance"))),
+     r"line 8, column \d+: its radiance is a mesh_attribute texture, and lights here cannot"),
     (scene_xml(SHAPE.format("linearcurve", "")), "a shape of type 'linearcurve' cannot be"),
     (scene_xml(SHAPE.format("sphere", '<medium name="interior" type="homogeneous"/>')),
      "media cannot be rendered here, only surfaces"),
