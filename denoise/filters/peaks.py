@@ -6,11 +6,12 @@ keeps it from some of them, and so loses light. Symbols: x the luminance of the 
 m its mean over those of the 24 pixels around that see the same object, F the last filter, S a
 smoothing by geometry alone, as wide as that of the innovation.
 
-    x' = min(x, 2.5 m),   output = F[x'] min(S[x] / S[x'], 3)
+    x' = min(x, t m),   output = F[x'] min(S[x] / S[x'], 6)
 
-Where history is long, or light is bright for a reason, little is above 2.5 m; what is has its share
-in S of the light all around. Light is lost where the limit, 3, is reached: where S reaches only few
-pixels, as on leaves and small bent things.
+with t = 2.5 of diffuse light, whose caustics are bright for a reason, and 1.5 of glossy light. Where
+history is long, little is above t m; what is has its share in S of the light all around. Light is
+lost where the limit, 6, is reached: where S reaches only few pixels, as on leaves and small bent
+things.
 
 Source: our own, of two known parts: outliers by their neighbours (as in GAMES202, lecture 13, here
 by the mean alone), and the ratio of two smoothings (Heitz et al. 2018), which gives light back.
@@ -18,18 +19,20 @@ by the mean alone), and the ratio of two smoothings (Heitz et al. 2018), which g
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import drjit as dr
 
-from onespp.denoise.inputs.signals import Signal
+from onespp.denoise.inputs.signals import Signal, SignalKind
 from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.structure import mapped
 from onespp.denoise.jit.taps import Taps
 
 RADIUS = 2                     # pixels
-OUTLIER = 2.5                  # times the mean of those around
-MOST = 3.0                     # that light is multiplied by
+MOST = 6.0                     # that light is multiplied by
+OUTLIER = {SignalKind.DIFFUSE: 2.5, SignalKind.GLOSSY: 1.5}
+"""t, times the mean of those around."""
 
 
 class Energies(NamedTuple):
@@ -39,13 +42,13 @@ class Energies(NamedTuple):
     after: list[Float]
 
 
-def without_peaks(lights: list[Signal], luminances: Taps[list[Float]],
+def without_peaks(kinds: Sequence[SignalKind], lights: list[Signal], luminances: Taps[list[Float]],
                   ids: Taps[Float]) -> tuple[list[Signal], Energies]:
-    """Each light without what is above `OUTLIER` times the mean around, and its energies.
+    """Each light without what is above t times the mean around, and its energies.
 
     Args:
-        luminances: of the lights, at least 0. ids: of objects. Both of the window of `RADIUS`, of
-            which the last is the pixel.
+        kinds: of the lights. luminances: of the lights, at least 0. ids: of objects. Both of the
+            window of `RADIUS`, of which the last is the pixel.
     """
     last = len(luminances) - 1
     center, id_ = luminances.at(last), ids.at(last)
@@ -56,8 +59,8 @@ def without_peaks(lights: list[Signal], luminances: Taps[list[Float]],
         count += dr.select(same, 1, 0)
         luminances.next()
     shares = []
-    for x, total in zip(center, sums):
-        least = OUTLIER * total / dr.maximum(count, 1)
+    for kind, x, total in zip(kinds, center, sums, strict=True):
+        least = OUTLIER[kind] * total / dr.maximum(count, 1)
         is_peak = (x > least) & (least > 0)
         shares.append(dr.select(is_peak, least / dr.select(is_peak, x, 1), 1))
     kept = [mapped(lambda v, s=share: v * s, light) for light, share in zip(lights, shares)]

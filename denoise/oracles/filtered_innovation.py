@@ -261,7 +261,7 @@ def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, s
         weaker = fade if i == levels - 1 else np.ones_like(fade)
         if i >= levels:
             mean2 = np.maximum(lum(image[..., :3]) ** 2, 1e-12)
-            weaker = np.clip(5 * variance / mean2, 1e-6, 1)
+            weaker = np.clip(2.5 * variance / mean2, 1e-6, 1)
         pixels = pixels_of(frame, m, x=image, v=variance, fade=weaker, narrow=narrow, counts=counts,
                            sigma=sigma)
         total, squares, weights = np.zeros_like(image), np.zeros(shape), np.zeros(shape)
@@ -531,9 +531,9 @@ def contact(frame: Frame, m, name: str, length: np.ndarray) -> np.ndarray:
     return (near("blocker_distance", seen) + of_paths) * trust
 
 
-def without_peaks(frame: Frame, image: np.ndarray, levels: int, m) -> tuple:
-    """Light without what is above 2.5 times the mean of the same object around, and the factor that
-    gives it back."""
+def without_peaks(frame: Frame, image: np.ndarray, most: float, levels: int, m) -> tuple:
+    """Light without what is above `most` times the mean of the same object around, and the factor
+    that gives it back."""
     x, shape = np.maximum(lum(image), 0), frame["id"].shape
     pixels = pixels_of(frame, m, x=x)
     count, total = np.zeros(shape), np.zeros(shape)
@@ -544,11 +544,11 @@ def without_peaks(frame: Frame, image: np.ndarray, levels: int, m) -> tuple:
         same = (p.id == q.id) & (p.id >= 0)
         count[where] += same
         total[where] += q.x * same
-    least = 2.5 * total / np.maximum(count, 1)
+    least = most * total / np.maximum(count, 1)
     share = np.where((least > 0) & (x > least), least / np.maximum(x, 1e-30), 1)
     before, after = np.moveaxis(smooth(frame, np.stack([x, x * share], -1), np.ones(x.shape),
                                        levels, m), -1, 0)
-    factor = np.where(after > 0, np.clip(before / np.where(after > 0, after, 1), 1, 3), 1)
+    factor = np.where(after > 0, np.clip(before / np.where(after > 0, after, 1), 1, 6), 1)
     return image * share[..., None], factor
 
 
@@ -782,7 +782,8 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
             before, factor = history, np.ones(found.shape)
             if name in "LG" and has_peaks:
                 wide = m.innovation_levels if "L" in signals else m.sharp_innovation_levels
-                before, factor = without_peaks(frame, history, wide, m)
+                before, factor = without_peaks(frame, history, {"L": 2.5, "G": 1.5}[name],
+                                               wide, m)
             fade = np.ones(found.shape) if name == "G" else fade
             out[name] = guided(frame, before, s2, levels, sigmas, fade, narrow, m,
                                np.clip(samples, 1e-5, 1) if sparse else None,

@@ -25,7 +25,7 @@ FEWEST_SAMPLES = 1e-5          # that a sparse signal's pixel counts for where i
 WIDE_LOBE = 0.1                # roughness: such a lobe blurs an image as far as the filter does
 NEIGHBOURS_NOISE = {           # share of a noisier neighbour's variance beyond the pixel's own
     SignalKind.DIFFUSE: 0.2, SignalKind.GLOSSY: 1.0, SignalKind.VISIBILITY: 0.0}
-_NOISY = 5.0                   # times the variance over the square of the mean: all of a level
+_NOISY = 2.5                   # times the variance over the square of the mean: all of a level
 _NEVER = -1e3                  # log2 of a weight that is 0
 
 
@@ -148,7 +148,7 @@ def _times(factor: Float) -> Callable[[Float], Float]:
 
 
 def noise_left(light: NoisySignal) -> Float:
-    """log2 of 5 s^2 / l^2, at most 0: a tap's weight where so much of the noise is left."""
+    """log2 of 5/2 s^2 / l^2, at most 0: a tap's weight where so much of the noise is left."""
     mean2 = dr.square(light.signal.luminance)
     share = _NOISY * light.variance / dr.maximum(mean2, EPSILON**2)
     return dr.log2(dr.clip(share, 1e-6, 1))

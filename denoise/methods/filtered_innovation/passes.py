@@ -153,7 +153,7 @@ class Passes:
             [output(i) for i in range(layout.deepest_output)],
             (buffer.taps(_WINDOW, range(len(layout.with_peaks))),
              surfaces.taps(_WINDOW, [_ID]).named(single)),
-            Step(without_peaks),
+            Step(lambda *a: without_peaks([layout.kinds[s] for s in layout.with_peaks], *a)),
             [energies(i) for i in range(layout.innovation_levels)] if layout.with_peaks else [],
             Step(with_their_light),
             Step(residual),

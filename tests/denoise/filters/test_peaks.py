@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from onespp.denoise.filters.peaks import Energies, with_their_light, without_peaks
-from onespp.denoise.inputs.signals import Signal
+from onespp.denoise.inputs.signals import Signal, SignalKind
 from onespp.denoise.jit.arrays import Color
 from onespp.denoise.jit.grid import Stencil, single
 from onespp.denoise.jit.taps import window
@@ -13,13 +14,14 @@ from onespp.denoise.jit.taps import window
 AROUND = [*window(2), (0, 0)]
 
 
-def trimmed(light: np.ndarray, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def trimmed(light: np.ndarray, ids: np.ndarray,
+            kind: SignalKind = SignalKind.DIFFUSE) -> tuple[np.ndarray, np.ndarray]:
     """(h, w) red of what is left of a light whose red is twice its luminance, and its share."""
     stencil = Stencil(*light.shape, 2)
     planes = stencil.planes([0.0, -1.0])
     (x,), (id_,) = stencil.load(light.astype(np.float32)), stencil.load(ids.astype(np.int32))
     planes.store([x, stencil.Float(id_)], gutters=True)
-    (signal,), energies = without_peaks([Signal(2 * x, x, x)], planes.taps(AROUND, [0]),
+    (signal,), energies = without_peaks([kind], [Signal(2 * x, x, x)], planes.taps(AROUND, [0]),
                                         planes.taps(AROUND, [1]).named(single))
     assert signal.red is not None
     red, before, after = (stencil.image(Color(v, v, v))[..., 0] for v in (
@@ -28,13 +30,15 @@ def trimmed(light: np.ndarray, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return red, after / np.maximum(light, 1e-30)
 
 
-def test_a_peak_keeps_two_and_a_half_times_the_mean_around():
+@pytest.mark.parametrize(("kind", "times"),
+                         [(SignalKind.DIFFUSE, 2.5), (SignalKind.GLOSSY, 1.5)])
+def test_a_peak_keeps_so_many_times_the_mean_around(kind: SignalKind, times: float):
     light = np.ones((7, 7))
-    light[3, 3], light[3, 4] = 100, 2
-    red, share = trimmed(light, np.zeros((7, 7)))
-    mean = (23 + 2) / 24
-    np.testing.assert_allclose(share[3, 3], 2.5 * mean / 100, rtol=1e-5)
-    np.testing.assert_allclose(red[3, 3], 5 * mean, rtol=1e-5)
+    light[3, 3], light[3, 4] = 100, 1.25
+    red, share = trimmed(light, np.zeros((7, 7)), kind)
+    mean = (23 + 1.25) / 24
+    np.testing.assert_allclose(share[3, 3], times * mean / 100, rtol=1e-5)
+    np.testing.assert_allclose(red[3, 3], 2 * times * mean, rtol=1e-5)
     share[3, 3] = 1
     np.testing.assert_array_equal(share, 1)  # neighbours of a peak are none
 
@@ -50,7 +54,7 @@ def test_another_object_or_the_dark_around_makes_no_peak():
 def test_what_was_taken_comes_back_where_light_is():
     stencil = Stencil(1, 4, 1)
     light = Signal(stencil.Float(2), stencil.Float(1), stencil.Float(0))
-    around = Energies([stencil.Float([1.5, 0.0, 9, 1.0])], [stencil.Float([1, 0, 1, 1.0001])])
+    around = Energies([stencil.Float([1.5, 0.0, 19, 1.0])], [stencil.Float([1, 0, 1, 1.0001])])
     (whole,) = with_their_light([light], around)
     assert whole.red is not None
-    np.testing.assert_allclose(whole.red.numpy(), [3, 2, 6, 2], rtol=1e-6)
+    np.testing.assert_allclose(whole.red.numpy(), [3, 2, 12, 2], rtol=1e-6)
