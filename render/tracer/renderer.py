@@ -123,7 +123,7 @@ class Renderer(View):
             planes = {}
             if set(channels) & _TRACED:
                 radiance = trace(scene, seen, pi, sampler, self.scene.max_depth,
-                                 self.candidates, self.lights, behind)
+                                 self.candidates, self.lights_now, behind)
                 if behind and behind.other:
                     radiance = self._with_layers(radiance, behind, sampler)
                 unit = dr.opaque(mi.Float, self.stage.unit)
