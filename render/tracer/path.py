@@ -92,6 +92,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         assert behind is not None
         beta, longest = mi.Color3f(behind.throughput), max_depth - behind.before
         opacity = behind.opacity
+        active = dr.max(behind.throughput) > 0  # a packet without layers takes no step
 
     split = None
     if dr.hint(lights is not None, mode="scalar"):
