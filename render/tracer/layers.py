@@ -78,7 +78,7 @@ def _followed(scene: mi.Scene, way: Way, pi: mi.PreliminaryIntersection3f, opaci
     lamps, context = mi.Color3f(0), mi.BSDFContext()
     way, pi, left = dr.copy(way), mi.PreliminaryIntersection3f(pi), mi.Float(opacity)
     active = mi.Bool(active)
-    while dr.hint(active, max_iterations=max_depth, label="layer"):
+    while dr.hint(active, exclude=[context], max_iterations=max_depth, label="layer"):
         si = pi.compute_surface_interaction(way.ray, mi.RayFlags.All | mi.RayFlags.dNSdUV, active)
         lamps += dr.select(active, way.throughput * si.emitter(scene).eval(si, active), 0)
         active &= si.is_valid() & (way.before + 1 < max_depth)

@@ -74,14 +74,15 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         behind: what `ray` and `pi` are behind, if anything. tell_straight: see `Radiance.straight`.
     """
     context = mi.BSDFContext()
-    ray = mi.Ray3f(ray)
+    o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
     pi = mi.PreliminaryIntersection3f(pi)
     emission, direct, indirect = mi.Color3f(0), mi.Color3f(0), mi.Color3f(0)
     specular, through_gloss = mi.Color3f(0), mi.Bool(False)
     hit_distance, hit_shape, hit_face = mi.Float(0), mi.UInt32(0), mi.UInt32(0)
-    straight, stays_straight = mi.Color3f(0), mi.Bool(True)
-    arrived = mi.Color3f(0)  # direct light, but for what purely specular lobes reflect
-    beta, eta = mi.Color3f(1), mi.Float(1)
+    straight = mi.Color3f(0) if tell_straight else None
+    stays_straight = mi.Bool(True) if tell_straight else None
+    arrived = None  # direct light, but for what purely specular lobes reflect
+    beta, eta = mi.Color3f(1), mi.Float(1) if max_depth > SHORT else None
     depth, longest, opacity = mi.UInt32(0), max_depth, None
     previous_p = mi.Point3f(0)
     bsdf_pdf = mi.Float(1)
@@ -91,6 +92,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         assert behind is not None
         beta, longest = mi.Color3f(behind.throughput), max_depth - behind.before
         opacity = behind.opacity
+        active = dr.max(behind.throughput) > 0  # a packet without layers takes no step
 
     split = None
     if dr.hint(lights is not None, mode="scalar"):
@@ -103,11 +105,12 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
             assert behind is not None
             split = split.through(behind.throughput)
         direct += split.direct
-        arrived += split.direct
+        arrived = mi.Color3f(split.direct)
 
-    while dr.hint(active, exclude=[split, behind], max_iterations=max_depth, label="path"):
-        si = pi.compute_surface_interaction(ray)
-        bsdf = si.bsdf(ray)
+    while dr.hint(active, exclude=[scene, context, lights, longest, opacity, split, behind],
+                  max_iterations=max_depth, label="path"):
+        si = pi.compute_surface_interaction(mi.Ray3f(o, d))
+        bsdf = si.bsdf()
 
         # Light that the last direction ran into (for depth 0: what the camera sees itself).
         surer = 1.0
@@ -136,13 +139,16 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         indirect += further
         specular += dr.select(through_gloss, further, 0)
 
-        ray = si.spawn_ray(si.to_world(bsdf_sample.wo))
+        onward = si.spawn_ray(si.to_world(bsdf_sample.wo))
+        o, d = onward.o, onward.d
         beta *= bsdf_weight
         bsdf_pdf = mi.Float(bsdf_sample.pdf)
         from_delta = mi.has_flag(bsdf_sample.sampled_type, mi.BSDFFlags.Delta)
         through_gloss |= (depth == 0) & (from_delta | mi.has_flag(bsdf_sample.sampled_type,
                                                                   mi.BSDFFlags.Glossy))
         if dr.hint(tell_straight, mode="scalar"):
+            assert straight is not None
+            assert stays_straight is not None
             straight += dr.select(stays_straight, found, 0)
             stays_straight &= is_straight(bsdf_sample, 1.0 if opacity is None else
                                           dr.select(depth == 0, opacity, 1))
@@ -150,17 +156,18 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         active = inner & (dr.max(beta) > 0)
         depth += 1
         if dr.hint(max_depth > SHORT, mode="scalar"):
+            assert eta is not None
             eta *= bsdf_sample.eta
             beta, goes_on = _roulette(beta, eta, depth, sampler.next_1d())
             active &= goes_on
-        pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        pi = scene.ray_intersect_preliminary(onward, coherent=False, active=active)
         met = active & (depth == 1) & pi.is_valid()
         hit_distance = dr.select(met, pi.t, hit_distance)
         hit_shape = dr.select(met, shape_index(pi.shape, met), hit_shape)
         hit_face = dr.select(met, pi.prim_index, hit_face)
 
     radiance = Radiance(emission, direct, indirect, specular, hit_distance, hit_shape, hit_face,
-                        straight=straight if tell_straight else None)
+                        straight=straight)
     return _with_split(radiance, arrived, split)
 
 
@@ -183,18 +190,18 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
     pi = mi.PreliminaryIntersection3f(pi)
     beta, eta, depth = mi.Color3f(0), mi.Float(1), mi.UInt32(0)
     previous_p, bsdf_pdf, from_delta = mi.Point3f(0), mi.Float(1), mi.Bool(True)
-    sample = mi.UInt32(start) - 1
+    sample, dimension = mi.UInt32(start) - 1, mi.UInt32(0)
     alive = mi.Bool(False)  # on the way to a hit; at the beginning, all have to start
     running = first.is_valid() & (start < end) & (max_depth > 1)
 
-    while dr.hint(running, label="samples"):
+    while dr.hint(running, exclude=[sampler], label="samples"):
         met = pi.compute_surface_interaction(ray, active=alive)
         found = _found_light(scene, met, previous_p, bsdf_pdf, from_delta)
         total += dr.select(alive, beta * found, 0)
 
         alive &= met.is_valid() & (depth + 1 < max_depth)
         sample += dr.select(alive, mi.UInt32(0), 1)
-        sampler.go_on(sample, ~alive)
+        numbers = sampler.at(sample, dr.select(alive, dimension, 0))
         running = sample < end
         beta, depth = dr.select(alive, beta, 1), dr.select(alive, depth, 0)
         eta = dr.select(alive, eta, 1)
@@ -202,9 +209,9 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
 
         bsdf = si.bsdf()
         smooth = running & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        total += beta * sought_light(scene, si, sampler, candidates, smooth)
-        bsdf_sample, bsdf_weight = bsdf.sample(mi.BSDFContext(), si, sampler.next_1d(),
-                                               sampler.next_2d(), running)
+        total += beta * sought_light(scene, si, numbers, candidates, smooth)
+        bsdf_sample, bsdf_weight = bsdf.sample(mi.BSDFContext(), si, numbers.next_1d(),
+                                               numbers.next_2d(), running)
         ray = si.spawn_ray(si.to_world(bsdf_sample.wo))
         beta *= bsdf_weight
         bsdf_pdf = mi.Float(bsdf_sample.pdf)
@@ -214,8 +221,9 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
         depth += 1
         if dr.hint(max_depth > SHORT, mode="scalar"):
             eta *= bsdf_sample.eta
-            beta, goes_on = _roulette(beta, eta, depth, sampler.next_1d())
+            beta, goes_on = _roulette(beta, eta, depth, numbers.next_1d())
             alive &= goes_on
+        dimension = mi.UInt32(numbers.dimension)
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=alive)
     return total
 
@@ -251,7 +259,8 @@ def _found_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, previous_p: mi.Po
     return power_heuristic(bsdf_pdf, surer * emitter_pdf) * hit.emitter.eval(si)
 
 
-def _with_split(radiance: Radiance, arrived: mi.Color3f, split: DirectLight | None) -> Radiance:
+def _with_split(radiance: Radiance, arrived: mi.Color3f | None,
+                split: DirectLight | None) -> Radiance:
     if split is not None:
         possible = mi.luminance(split.unshadowed)
         radiance.unshadowed, radiance.shadow_ray = split.unshadowed, split

@@ -59,7 +59,8 @@ class Renderer(View):
     @turn()
     def frame(self, index: int, seed: int = 0, channels: Sequence[str] = FRAME) -> Frame:
         """One frame at 1 spp: one kernel, only the channels asked for; then a small one a colour,
-        which lays its planes side by side.
+        which lays its planes side by side. (Before it a small one of what lights give, where they
+        have changed: `lights/middles.py`.)
 
         The result depends on (scene, index, seed, size) alone, and never on which other frames
         are rendered: the channels of `replay.py` replay frame `index` - 1, whether or not it is
@@ -123,7 +124,7 @@ class Renderer(View):
             planes = {}
             if set(channels) & _TRACED:
                 radiance = trace(scene, seen, pi, sampler, self.scene.max_depth,
-                                 self.candidates, self.lights, behind)
+                                 self.candidates, self.lights_now, behind)
                 if behind and behind.other:
                     radiance = self._with_layers(radiance, behind, sampler)
                 unit = dr.opaque(mi.Float, self.stage.unit)

@@ -20,6 +20,7 @@ filtering", section 4.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 
@@ -39,15 +40,20 @@ _THROUGH = +mi.BSDFFlags.DeltaTransmission | +mi.BSDFFlags.Null
 class Layer:
     """A ray that leaves a pixel's chain of surfaces, and what of its light the pixel shows.
 
-    throughput: 0 where there is none, over the probability of its having been picked. before:
-    segments before it. opacity: of the mask that it meets first, 1 where that is to be met by
-    chance as others are; None if there are no masks.
+    o, d: origin and direction. throughput: 0 where there is none, over the probability of its
+    having been picked. before: segments before it. opacity: of the mask that it meets first, 1
+    where that is to be met by chance as others are; None if there are no masks.
     """
 
-    ray: mi.Ray3f
+    o: mi.Point3f
+    d: mi.Vector3f
     throughput: mi.Color3f
     before: mi.UInt32
     opacity: mi.Float | None
+
+    @property
+    def ray(self) -> mi.Ray3f:
+        return mi.Ray3f(self.o, self.d)
 
 
 @dataclass
@@ -113,15 +119,16 @@ def replaced(stage: MitsubaScene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3
     reflect.type_mask, through.type_mask = mi.BSDFFlags.DeltaReflection, _THROUGH
     way, pi = Way.of(ray), mi.PreliminaryIntersection3f(pi)
     opacity = None if masks is None else mi.Float(1)
-    other = Layer(mi.Ray3f(ray), mi.Color3f(0), mi.UInt32(0), opacity)
-    aside = Aside.none(ray) if layered else None
-    total, picked = mi.Float(0), mi.Float(1)
-    left = mi.Float(0)
+    absent: Any = None  # no state of the loop where nothing is layered
+    other, aside, total, picked, left = (absent,) * 5
     if dr.hint(layered, mode="scalar"):
-        left = sampler.next_1d()
+        other = Layer(mi.Point3f(ray.o), mi.Vector3f(ray.d), mi.Color3f(0), mi.UInt32(0), opacity)
+        aside, left = Aside.none(ray), sampler.next_1d()
+        total, picked = mi.Float(0), mi.Float(1)
     active = pi.is_valid() & (max_depth > 1)
 
-    while dr.hint(active, max_iterations=max_depth, label="images"):
+    while dr.hint(active, exclude=[stage, rows, masks, reflect, through],
+                  max_iterations=max_depth, label="images"):
         si = pi.compute_surface_interaction(way.ray, mi.RayFlags.All | mi.RayFlags.dNSdUV, active)
         bsdf = si.bsdf()
         shape = shape_index(pi.shape, active)
@@ -142,19 +149,19 @@ def replaced(stage: MitsubaScene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3
                                    dr.select(passes, weight, share))
             rest = way.throughput * left_aside
             wo_aside = dr.select(is_mask, -si.wi, dr.select(passes, sample.wo, beyond.wo))
-            ray_aside = dr.select(is_hole, way.ray, si.spawn_ray(si.to_world(wo_aside)))
+            ray_aside = si.spawn_ray(si.to_world(wo_aside))
             brightness = dr.select(is_clear | is_mask, mi.luminance(rest), 0)
             brightness *= dr.select(is_hole, o, 1)
             total += brightness
             taken, left = offered(left, brightness, total)
-            other.ray = dr.select(taken, ray_aside, other.ray)
+            other.o = dr.select(taken, dr.select(is_hole, way.o, ray_aside.o), other.o)
+            other.d = dr.select(taken, dr.select(is_hole, way.d, ray_aside.d), other.d)
             other.throughput = dr.select(taken, rest, other.throughput)
             other.before = dr.select(
                 taken, dr.select(is_hole, way.before, way.before + 1), other.before)
             if dr.hint(masks is not None, mode="scalar"):
                 other.opacity = dr.select(taken, dr.select(is_hole, o, 1), other.opacity)
             picked = dr.select(taken, brightness, picked)
-            assert aside is not None
             is_one = brightness > 0
             goes_in = is_mask | ~passes
             there = dr.select(is_hole, way, stepped(
@@ -175,8 +182,9 @@ def replaced(stage: MitsubaScene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3
             pi = scene.ray_intersect_preliminary(way.ray, coherent=False, active=active)
             active &= pi.is_valid() & (way.before + 1 < max_depth)
 
-    other.throughput *= dr.select(total > 0, total / picked, 0)
-    return _came_to(way, pi, opacity, other if layered else None, aside)
+    if dr.hint(layered, mode="scalar"):
+        other.throughput *= dr.select(total > 0, total / picked, 0)
+    return _came_to(way, pi, opacity, other, aside)
 
 
 def _came_to(way: Way, pi: mi.PreliminaryIntersection3f, opacity: mi.Float | None = None,

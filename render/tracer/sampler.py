@@ -66,6 +66,14 @@ class Pcg:
         return mi.Point2f(self.generator.next_float32(), self.generator.next_float32())
 
 
+class _Fixed:
+    """What of a `Sobol` is the same all along a path. No Dr.Jit structure, so that it is no state
+    of loops: what does not change there has the loop recorded a second time."""
+
+    def __init__(self, index: mi.UInt32, seed: mi.UInt32) -> None:
+        self.index, self.seed = index, seed
+
+
 class Sobol:
     """Numbers that stratify the samples of one pixel: padded 2D Sobol points, Owen-scrambled.
 
@@ -75,29 +83,30 @@ class Sobol:
     of Laine and Karras; the second Sobol dimension by Ahmed 2024's bit-parallel product.
     """
 
-    DRJIT_STRUCT: ClassVar[dict] = {"index": mi.UInt32, "seed": mi.UInt32, "dimension": mi.UInt32}
+    DRJIT_STRUCT: ClassVar[dict] = {"fixed": object, "dimension": mi.UInt32}
 
     def __init__(self, keys: Keys | None = None, pixel: mi.UInt32 | None = None,
                  index: mi.UInt32 | None = None) -> None:
         """`index` is the sample's number, from 0; `keys` and `pixel` pick the scrambling."""
-        self.index, self.seed, self.dimension = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
+        self.fixed, self.dimension = _Fixed(mi.UInt32(0), mi.UInt32(0)), mi.UInt32(0)
         if keys is not None:
             a, b = mi.sample_tea_32(pixel, keys[0])
-            self.seed = a ^ b ^ keys[1]
-            self.index = mi.UInt32(index)
+            self.fixed = _Fixed(mi.UInt32(index), a ^ b ^ keys[1])
 
-    def go_on(self, index: mi.UInt32, anew: mi.Bool) -> None:
-        """To the first dimension of sample `index` where `anew`; the others are in it already."""
-        self.index = mi.UInt32(index)
-        self.dimension = dr.select(anew, 0, self.dimension)
+    def at(self, index: mi.UInt32, dimension: mi.UInt32) -> Sobol:
+        """The same scrambling, at a dimension of sample `index`."""
+        other = Sobol()
+        other.fixed = _Fixed(mi.UInt32(index), self.fixed.seed)
+        other.dimension = mi.UInt32(dimension)
+        return other
 
     def next_1d(self) -> mi.Float:
         order, scramble, _ = self._next_seeds()
-        return _unit(_owen(dr.brev(_shuffle(self.index, order)), scramble))
+        return _unit(_owen(dr.brev(_shuffle(self.fixed.index, order)), scramble))
 
     def next_2d(self) -> mi.Point2f:
         order, scramble_x, scramble_y = self._next_seeds()
-        x = dr.brev(_shuffle(self.index, order))
+        x = dr.brev(_shuffle(self.fixed.index, order))
         y = mi.UInt32(x)
         y ^= y << 16
         y ^= (y & 0x00FF00FF) << 8
@@ -107,7 +116,7 @@ class Sobol:
         return mi.Point2f(_unit(_owen(x, scramble_x)), _unit(_owen(y, scramble_y)))
 
     def _next_seeds(self) -> tuple[mi.UInt32, mi.UInt32, mi.UInt32]:
-        a, b = mi.sample_tea_32(self.seed, self.dimension)
+        a, b = mi.sample_tea_32(self.fixed.seed, self.dimension)
         self.dimension += 1
         return a, b, a ^ dr.brev(b)
 

@@ -50,6 +50,7 @@ class View:
             raise InputError(f"the size {width}x{height} is empty: use at least 1x1")
         self.scene, self.height, self.width = scene, height, width
         self.stage = MitsubaScene(scene)
+        self._told: tuple[float | None, Lights] | None = None
         self.candidates = 1 if direct == "mis" else candidates_for(self.stage.mi_scene)
 
     @property
@@ -62,6 +63,19 @@ class View:
         """Those that direct light is resampled from, None without a split. To find them moves the
         stage."""
         return find_lights(self.stage) if self.splits else None
+
+    @property
+    def lights_now(self) -> Lights | None:
+        """`lights`, with what they give at the frame that the stage is set to."""
+        frame = self.stage.frame if self._lights_change else None
+        if self.lights and (not self._told or self._told[0] != frame):
+            self._told = frame, self.lights.now(self.stage.mi_scene)
+        return self._told and self._told[1]
+
+    @cached_property
+    def _lights_change(self) -> bool:
+        return any(shape.emission is not None and (shape.moves or callable(shape.emission))
+                   for shape in self.scene.shapes)
 
     def rays(self, jittered: bool = True) -> PixelRays:
         """Rays through points of the image, at the frame that the stage is set to.

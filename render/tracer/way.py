@@ -41,13 +41,15 @@ _BENDS = 1e-5  # curvature times length, below which a pane leaves things where 
 class Way:
     """Where a camera ray is on its way.
 
-    ray: the last segment. throughput: of the surfaces before. before: segments before the last.
-    along: their length. lens: a, b, c, e, of s -> (a s + b) / (c s + e), the length of the image of
-    what is s behind the last surface. columns: of H. images: the shape that its end is an image in,
-    its index in the JIT registry, 0 for none; several: whether there is another.
+    o, d: origin and direction of the last segment. throughput: of the surfaces before. before:
+    segments before the last. along: their length. lens: a, b, c, e, of s -> (a s + b) / (c s + e),
+    the length of the image of what is s behind the last surface. columns: of H. images: the shape
+    that its end is an image in, its index in the JIT registry, 0 for none; several: whether there
+    is another.
     """
 
-    ray: mi.Ray3f
+    o: mi.Point3f
+    d: mi.Vector3f
     throughput: mi.Color3f
     before: mi.UInt32
     along: mi.Float
@@ -59,10 +61,15 @@ class Way:
     @staticmethod
     def of(ray: mi.Ray3f) -> Way:
         """Of a camera ray."""
-        return Way(mi.Ray3f(ray), mi.Color3f(1), mi.UInt32(0), mi.Float(0),
+        return Way(mi.Point3f(ray.o), mi.Vector3f(ray.d), mi.Color3f(1), mi.UInt32(0), mi.Float(0),
                    (mi.Float(1), mi.Float(0), mi.Float(0), mi.Float(1)),
                    (mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0), mi.Vector3f(0, 0, 1)),
                    mi.UInt32(0), mi.Bool(False))
+
+    @property
+    def ray(self) -> mi.Ray3f:
+        """The last segment."""
+        return mi.Ray3f(self.o, self.d)
 
     def length(self, t: mi.Float) -> mi.Float:
         """Of the image, from the camera, of what the last segment meets after t."""
@@ -101,8 +108,8 @@ def stepped(way: Way, si: mi.SurfaceInteraction3f, t: mi.Float, shape: mi.UInt32
     is_image = ~passes | ((eta != 1) & (dr.abs(k) * t > _BENDS))
     several = way.several | (is_image & (way.images != 0) & (way.images != shape))
     images = dr.select(is_image & (way.images == 0), shape, way.images)
-    return Way(leaving, way.throughput * weight, way.before + 1, way.along + t, (a, b, c, e),
-               (x, y, z), images, several)
+    return Way(leaving.o, leaving.d, way.throughput * weight, way.before + 1, way.along + t,
+               (a, b, c, e), (x, y, z), images, several)
 
 
 def combined(x: mi.Vector3f, y: mi.Vector3f, z: mi.Vector3f, v: mi.Vector3f) -> mi.Vector3f:

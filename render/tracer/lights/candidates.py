@@ -56,8 +56,8 @@ def sought_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
     total = mi.Float(0)
     kept, kept_luminance, place = mi.Color3f(0), mi.Float(0), mi.Point3f(0)
     i = mi.UInt32(0)
-    while dr.hint(i < candidates, exclude=[scene, sampler], max_iterations=candidates,
-                  label="candidates"):
+    while dr.hint(i < candidates, exclude=[scene, sampler, context, bsdf, si, start, active],
+                  max_iterations=candidates, label="candidates"):
         y = start.y + GOLDEN * i  # each candidate is uniform for itself; together they spread
         point = mi.Point2f((start.x + i) / candidates, y - dr.floor(y))
         light, weight = scene.sample_emitter_direction(si, point, False, active)

@@ -45,11 +45,13 @@ from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.sampler import Sampler
 
 from .clusters import Clusters, light_of_cluster
+from .middles import Middles, middles_of
 from .reservoir import offered
 from .strata import light_point
 from .sun import SUN_BIT, Sun
 
 DELTA = 0.1
+MOST_CALLED = 16  # BSDFs, up to which each compares strata in a call of its own
 _DIMMEST = 1e-6  # share of l(U): a group that gives less has no visibility
 
 
@@ -60,7 +62,8 @@ class Lights:
     stratum: which part of which light it is (`stratum_word`). group: that it is in. sizes: strata
     in each group, none where all lights are one. emitters: E, 1 or more. environment: index of that
     emitter, E where there is none. sun: None where there is none. clusters: of each stratum, None
-    where no light speaks for others.
+    where no light speaks for others. surfaces: `ptr` of the BSDFs that shapes have. middles: of the
+    scene as it stands, None where each pixel is to ask the lights themselves.
     """
 
     stratum: mi.UInt32
@@ -70,6 +73,13 @@ class Lights:
     environment: mi.UInt32
     sun: Sun | None = None
     clusters: Clusters | None = None
+    surfaces: frozenset[int] = frozenset()
+    middles: Middles | None = None
+
+    def now(self, scene: mi.Scene) -> Lights:
+        """With the middles of the scene as it stands, if all of its lights have them."""
+        return replace(self, middles=middles_of(scene, self.stratum, self.share(self.stratum),
+                                                self.clusters, self.sun))
 
     def share(self, stratum: mi.UInt32) -> mi.Float:
         """By how much the density of a stratum's light counts in weights: see `strata.py`."""
@@ -119,6 +129,24 @@ class DirectLight:
                        unshadowed=throughput * self.unshadowed, groups=groups)
 
 
+@dataclass
+class Pick:
+    """A stratum, picked by p_k, its number; luminance: of its w_k c_k. unshadowed: U; by_group: of
+    each U_g; total: l of their sum."""
+
+    unshadowed: mi.Color3f
+    total: mi.Float
+    by_group: list[mi.Color3f]
+    stratum: mi.UInt32
+    luminance: mi.Float
+
+    @staticmethod
+    def none(lights: Lights) -> Pick:
+        """Of a surface to which no light can give anything."""
+        return Pick(mi.Color3f(0), mi.Float(0), [mi.Color3f(0) for _ in lights.sizes],
+                    mi.UInt32(0), mi.Float(0))
+
+
 @dr.syntax
 def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
                     active: mi.Bool, lights: Any) -> DirectLight:
@@ -129,44 +157,10 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     """
     strata = dr.width(lights.stratum)
     choice, jitter = sampler.next_1d(), sampler.next_2d()
-
-    # One pass: the sum, and a pick in proportion to luminance (a reservoir of one).
-    left = mi.Float(choice)
-    unshadowed, total = mi.Color3f(0), mi.Float(0)
-    picked, picked_luminance = mi.UInt32(0), mi.Float(0)
-    by_group = [mi.Color3f(0) for _ in lights.sizes]
-    k = mi.UInt32(0)
-    while dr.hint(k < strata, max_iterations=strata, label="lights"):
-        stratum = dr.gather(mi.UInt32, lights.stratum, k, active)
-        middle = light_point(scene, si, stratum, mi.Point2f(0.5), active, lights.sun)
-        c = mi.Color3f(middle.c)
-        if dr.hint(lights.clusters is not None, mode="scalar"):
-            c *= dr.gather(mi.Float, lights.clusters.scale, k, active)
-        unshadowed += c
-        if dr.hint(len(lights.sizes) > 0, mode="scalar"):
-            c = middle.weight(lights.share(stratum)) * c
-            group = dr.gather(mi.UInt32, lights.group, k, active)
-            by_group = added(by_group, group, c)
-        luminance = mi.luminance(c)
-        total += luminance
-        taken, left = offered(left, luminance, total)
-        picked = dr.select(taken, k, picked)
-        picked_luminance = dr.select(taken, luminance, picked_luminance)
-        k += 1
-
-    dark = total <= 0
-    uniform = dark | (left < DELTA)
-    anywhere = dr.select(dark, choice, left / DELTA)
-    picked = dr.select(uniform, dr.minimum(mi.UInt32(anywhere * strata), strata - 1), picked)
+    pick = _picked(scene, si, choice, active, lights)
+    picked, total = pick.stratum, pick.total
+    p = dr.select(total <= 0, 1, (1 - DELTA) * strata * pick.luminance / total + DELTA) / strata
     stratum = dr.gather(mi.UInt32, lights.stratum, picked, active)
-    middle = light_point(scene, si, stratum, mi.Point2f(0.5), active & uniform, lights.sun)
-    of_middle = mi.Color3f(middle.c)
-    if dr.hint(len(lights.sizes) > 0, mode="scalar"):
-        of_middle = middle.weight(lights.share(stratum)) * of_middle
-    if dr.hint(lights.clusters is not None, mode="scalar"):
-        of_middle *= dr.gather(mi.Float, lights.clusters.scale, picked, active)
-    picked_luminance = dr.select(uniform, mi.luminance(of_middle), picked_luminance)
-    p = dr.select(dark, 1, (1 - DELTA) * strata * picked_luminance / total + DELTA) / strata
 
     more = mi.Float(1)
     if dr.hint(lights.clusters is not None, mode="scalar"):
@@ -184,13 +178,88 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
         to_sun = lit & ((stratum & SUN_BIT) != 0)
     if dr.hint(len(lights.sizes) > 0, mode="scalar"):
         group = dr.gather(mi.UInt32, lights.group, picked, active)
-        sample = group_sample(lights, by_group, group, total, mi.luminance(direct),
-                              picked_luminance / p, active)
+        sample = group_sample(lights, pick.by_group, group, total, mi.luminance(direct),
+                              pick.luminance / p, active)
     return DirectLight(
-        direct, unshadowed,
+        direct, pick.unshadowed,
         dr.select(lit, light.p - si.p, 0), shape_index(light.emitter.get_shape(), lit),
         dr.select(lit & shadowed, blocker.t, 0), shape_index(blocker.shape, lit & shadowed),
         blocker.prim_index, to_sun, sample)
+
+
+def _picked(scene: mi.Scene, si: mi.SurfaceInteraction3f, choice: mi.Float, active: mi.Bool,
+            lights: Lights) -> Pick:
+    """A stratum, by what the middles of all give; choice: random, in [0, 1).
+
+    Where few BSDFs are, each compares all strata in one call of its own, which saves a call a
+    stratum; the more there are, the more of such calls have to be recorded.
+    """
+    middles, surfaces = lights.middles, lights.surfaces
+    if middles is None:
+        def asked(k: mi.UInt32, active: mi.Bool) -> tuple[mi.Color3f, mi.Float, mi.Float]:
+            stratum = dr.gather(mi.UInt32, lights.stratum, k, active)
+            middle = light_point(scene, si, stratum, mi.Point2f(0.5), active, lights.sun)
+            scale = (1 if lights.clusters is None
+                     else dr.gather(mi.Float, lights.clusters.scale, k, active))
+            return middle.c, middle.weight(lights.share(stratum)), scale
+        return _compared(asked, choice, active, lights)
+
+    def at_one(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f, choice: mi.Float,
+               active: mi.Bool) -> Pick:
+        def told(k: mi.UInt32, active: mi.Bool) -> tuple[mi.Color3f, mi.Float, mi.Float]:
+            middle = middles.at(k, si.p)
+            value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, si.to_local(middle.d), active)
+            c = dr.select(active & (middle.pdf > 0), value * middle.light, 0) / middle.square
+            return c, middle.weight(pdf), middle.scale
+        return _compared(told, choice, active, lights)
+
+    def called(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f, choice: mi.Float,
+               active: mi.Bool) -> Pick:
+        is_lit = bsdf.ptr in surfaces and mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        return at_one(bsdf, si, choice, active) if is_lit else Pick.none(lights)
+
+    if len(surfaces) > MOST_CALLED:
+        return at_one(si.bsdf(), si, choice, active)
+    return dr.dispatch(si.bsdf(), called, si, choice, active)
+
+
+@dr.syntax
+def _compared(contribution: Any, choice: mi.Float, active: mi.Bool, lights: Any) -> Pick:
+    """The same; contribution: of a stratum, where active: c, w, and s of `clusters.py`."""
+    strata, groups = dr.width(lights.stratum), len(lights.sizes)
+    # One pass: the sum, and a pick in proportion to luminance (a reservoir of one).
+    left = mi.Float(choice)
+    unshadowed, total = mi.Color3f(0), mi.Float(0)
+    picked, picked_luminance = mi.UInt32(0), mi.Float(0)
+    by_group = [mi.Color3f(0) for _ in lights.sizes]
+    k = mi.UInt32(0)
+    while dr.hint(k < strata, exclude=[active, lights, contribution], max_iterations=strata,
+                  label="lights"):
+        c, weight, scale = contribution(k, active)
+        if dr.hint(lights.clusters is not None, mode="scalar"):
+            c *= scale
+        unshadowed += c
+        if dr.hint(groups > 0, mode="scalar"):
+            c = weight * c
+            by_group = added(by_group, dr.gather(mi.UInt32, lights.group, k, active), c)
+        luminance = mi.luminance(c)
+        total += luminance
+        taken, left = offered(left, luminance, total)
+        picked = dr.select(taken, k, picked)
+        picked_luminance = dr.select(taken, luminance, picked_luminance)
+        k += 1
+
+    dark = total <= 0
+    uniform = dark | (left < DELTA)
+    anywhere = dr.select(dark, choice, left / DELTA)
+    picked = dr.select(uniform, dr.minimum(mi.UInt32(anywhere * strata), strata - 1), picked)
+    c, weight, scale = contribution(picked, active & uniform)
+    if dr.hint(groups > 0, mode="scalar"):
+        c = weight * c
+    if dr.hint(lights.clusters is not None, mode="scalar"):
+        c *= scale
+    picked_luminance = dr.select(uniform, mi.luminance(c), picked_luminance)
+    return Pick(unshadowed, total, by_group, picked, picked_luminance)
 
 
 def added(lights: list[mi.Color3f], group: mi.UInt32, light: mi.Color3f) -> list[mi.Color3f]:

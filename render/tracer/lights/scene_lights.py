@@ -65,7 +65,7 @@ def find_lights(stage: MitsubaScene) -> Lights:
     stratum, group, sizes, speaking = _in_strata(lights, clusters, luminances, delta)
     environment = next((i for i, e in enumerate(emitters) if e.is_environment()), len(emitters))
     return Lights(stratum, group, sizes, max(1, len(emitters)), dr.opaque(mi.UInt32, environment),
-                  sun, speaking)
+                  sun, speaking, frozenset(s.bsdf().ptr for s in stage.mi_scene.shapes()))
 
 
 def _in_strata(lights: np.ndarray, clusters: list[tuple[np.ndarray, float]],

@@ -42,13 +42,18 @@ def stratum_word(light: Any, halvings: Any, cell: Any) -> Any:
     return light + halvings * 16 + cell
 
 
+def stratum_place(stratum: mi.UInt32, place: mi.Point2f) -> tuple[mi.Point2f, mi.Float]:
+    """A place in a stratum on the sample square of its light, and how many are along a side."""
+    halvings, cell = (stratum >> 4) & 7, stratum & 15  # no division: idle lanes have all bits 0
+    row, side = cell >> halvings, mi.Float(1 << halvings)
+    return (mi.Point2f(cell - (row << halvings), row) + place) / side, side
+
+
 def light_point(scene: mi.Scene, si: mi.SurfaceInteraction3f, stratum: mi.UInt32,
                 place: mi.Point2f, active: mi.Bool, sun: Sun | None) -> LightPoint:
     """At a place in a stratum, toward `si.wi`."""
     emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), stratum >> 8, active)
-    halvings, cell = (stratum >> 4) & 7, stratum & 15  # no division: idle lanes have all bits 0
-    row, side = cell >> halvings, mi.Float(1 << halvings)
-    sample = (mi.Point2f(cell - (row << halvings), row) + place) / side
+    sample, side = stratum_place(stratum, place)
     light, weight = emitter.sample_direction(si, sample, active)
     if sun is not None:
         light, weight = sun.told_apart(scene, si, stratum, sample, light, weight, active)

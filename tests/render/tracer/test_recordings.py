@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import drjit as dr
 import pytest
 
 from onespp.render.channels import FRAME, GLOSS, REPLAY, SHADOW, SPLIT
+from onespp.render.tracer import layers, path, replacement
+from onespp.render.tracer.lights import candidates
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 from onespp.scenes.description import Camera, Cylinder, Disk, Mesh, Rectangle, Scene, Shape, Sphere
@@ -81,3 +84,19 @@ def test_nor_is_the_room_when_its_ceiling_light_moves():
     renderer = Renderer(replace(room, shapes=shapes), HEIGHT, WIDTH, direct="resampled",
                         sampler="zsobol")
     assert new_kernels(lambda index: renderer.frame(index, 0, renderer.channels)) == 0
+
+
+@pytest.mark.parametrize(("name", "paths", "steps"), [
+    ("box", 1, [0, 0]), ("hard/mirror", 1, [1, 0]), ("hard/thin-glass", 2, [2, 1]),
+    ("hard/foliage", 2, [2, 1])])
+def test_no_loop_is_recorded_twice(name, paths, steps, monkeypatch):
+    """Dr.Jit records one again if some of its state stays as it is, and all loops in it."""
+    counts = []
+    for module, function in ((path, "sought_light"), (candidates, "offered"),
+                             (replacement, "stepped"), (layers, "stepped")):
+        counted = Mock(wraps=getattr(module, function))
+        monkeypatch.setattr(module, function, counted)
+        counts.append(counted)
+    renderer = Renderer(catalog.load(name), HEIGHT, WIDTH, direct="resampled", sampler="zsobol")
+    renderer.frame(0, 0, renderer.channels)
+    assert [counted.call_count for counted in counts] == [paths, paths, *steps]
