@@ -2,16 +2,16 @@
 
 A path that meets a lamp by a rare chance, as by way of a glossy floor, is a pixel many times as
 bright as those around. A filter that weighs by noise spreads it over its few pixels, as a blob, or
-keeps it from some of them, and so loses light. Symbols: x the luminance of the history in a pixel,
-m its mean over those of the 24 pixels around that see the same object, F the last filter, S a
-smoothing by geometry alone, as wide as that of the innovation.
+keeps it from some of them, and so loses light. Symbols: d luminance of the frame, h of its history,
+0 without one, x of the two merged; m the mean of x over those of the 24 pixels around that see the
+same object, F the last filter, S a smoothing by geometry alone, as wide as that of the innovation.
 
-    x' = min(x, t m),   output = F[x'] min(S[x] / S[x'], 6)
+    x' = min(x, max(t m, 3/4 min(d, h))),   output = F[x'] min(S[x] / S[x'], 6)
 
-with t = 2.5 of diffuse light, whose caustics are bright for a reason, and 1.5 of glossy light. Where
-history is long, little is above t m; what is has its share in S of the light all around. Light is
-lost where the limit, 6, is reached: where S reaches only few pixels, as on leaves and small bent
-things.
+with t = 2.5 of diffuse light, whose caustics are bright for a reason, and 1.5 of glossy light. What
+both have is no rare chance, as a highlight on a small bent thing. What is taken has its share in S
+of the light all around. Light is lost where the limit, 6, is reached: where S reaches only few
+pixels, as on leaves.
 
 Source: our own, of two known parts: outliers by their neighbours (as in GAMES202, lecture 13, here
 by the mean alone), and the ratio of two smoothings (Heitz et al. 2018), which gives light back.
@@ -33,6 +33,7 @@ RADIUS = 2                     # pixels
 MOST = 6.0                     # that light is multiplied by
 OUTLIER = {SignalKind.DIFFUSE: 2.5, SignalKind.GLOSSY: 1.5}
 """t, times the mean of those around."""
+_SEEN_TWICE = 0.75             # of what frame and history both have, which is left
 
 
 class Energies(NamedTuple):
@@ -42,13 +43,14 @@ class Energies(NamedTuple):
     after: list[Float]
 
 
-def without_peaks(kinds: Sequence[SignalKind], lights: list[Signal], luminances: Taps[list[Float]],
+def without_peaks(kinds: Sequence[SignalKind], lights: list[Signal], seen_twice: list[Float],
+                  luminances: Taps[list[Float]],
                   ids: Taps[Float]) -> tuple[list[Signal], Energies]:
-    """Each light without what is above t times the mean around, and its energies.
+    """Each light without its peaks, x', and its energies.
 
     Args:
-        kinds: of the lights. luminances: of the lights, at least 0. ids: of objects. Both of the
-            window of `RADIUS`, of which the last is the pixel.
+        kinds: of the lights. seen_twice: min(d, h) of each. luminances: x, at least 0. ids: of
+            objects. Both of the window of `RADIUS`, of which the last is the pixel.
     """
     last = len(luminances) - 1
     center, id_ = luminances.at(last), ids.at(last)
@@ -59,8 +61,8 @@ def without_peaks(kinds: Sequence[SignalKind], lights: list[Signal], luminances:
         count += dr.select(same, 1, 0)
         luminances.next()
     shares = []
-    for kind, x, total in zip(kinds, center, sums, strict=True):
-        least = OUTLIER[kind] * total / dr.maximum(count, 1)
+    for kind, twice, x, total in zip(kinds, seen_twice, center, sums, strict=True):
+        least = dr.maximum(OUTLIER[kind] * total / dr.maximum(count, 1), _SEEN_TWICE * twice)
         is_peak = (x > least) & (least > 0)
         shares.append(dr.select(is_peak, least / dr.select(is_peak, x, 1), 1))
     kept = [mapped(lambda v, s=share: v * s, light) for light, share in zip(lights, shares)]

@@ -531,9 +531,10 @@ def contact(frame: Frame, m, name: str, length: np.ndarray) -> np.ndarray:
     return (near("blocker_distance", seen) + of_paths) * trust
 
 
-def without_peaks(frame: Frame, image: np.ndarray, most: float, levels: int, m) -> tuple:
-    """Light without what is above `most` times the mean of the same object around, and the factor
-    that gives it back."""
+def without_peaks(frame: Frame, image: np.ndarray, twice: np.ndarray, most: float, levels: int,
+                  m) -> tuple:
+    """Light without what is above `most` times the mean of the same object around and above three
+    quarters of what was seen twice, and the factor that gives it back."""
     x, shape = np.maximum(lum(image), 0), frame["id"].shape
     pixels = pixels_of(frame, m, x=x)
     count, total = np.zeros(shape), np.zeros(shape)
@@ -544,7 +545,7 @@ def without_peaks(frame: Frame, image: np.ndarray, most: float, levels: int, m) 
         same = (p.id == q.id) & (p.id >= 0)
         count[where] += same
         total[where] += q.x * same
-    least = most * total / np.maximum(count, 1)
+    least = np.maximum(most * total / np.maximum(count, 1), 0.75 * twice)
     share = np.where((least > 0) & (x > least), least / np.maximum(x, 1e-30), 1)
     before, after = np.moveaxis(smooth(frame, np.stack([x, x * share], -1), np.ones(x.shape),
                                        levels, m), -1, 0)
@@ -782,8 +783,9 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
             before, factor = history, np.ones(found.shape)
             if name in "LG" and has_peaks:
                 wide = m.innovation_levels if "L" in signals else m.sharp_innovation_levels
-                before, factor = without_peaks(frame, history, {"L": 2.5, "G": 1.5}[name],
-                                               wide, m)
+                twice = np.where(found, np.minimum(lum(d), lum(d - e)), 0)
+                before, factor = without_peaks(frame, history, twice,
+                                               {"L": 2.5, "G": 1.5}[name], wide, m)
             fade = np.ones(found.shape) if name == "G" else fade
             out[name] = guided(frame, before, s2, levels, sigmas, fade, narrow, m,
                                np.clip(samples, 1e-5, 1) if sparse else None,

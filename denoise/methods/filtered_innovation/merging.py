@@ -3,7 +3,7 @@
 # pyright: standard
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import drjit as dr
@@ -12,7 +12,7 @@ from onespp.denoise.filters.contact import ContactFalloff, contact_falloff
 from onespp.denoise.filters.penumbra import sharpened
 from onespp.denoise.inputs.signals import LARGEST_VISIBILITY, Chosen, Signal, SignalKind
 from onespp.denoise.inputs.surface import TangentPlane
-from onespp.denoise.jit.arrays import Float
+from onespp.denoise.jit.arrays import Bool, Float
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import mapped
 
@@ -65,7 +65,8 @@ class Gains(NamedTuple):
 class Merged(NamedTuple):
     """The new history of each signal, its lengths, and `fade_out` of each signal, of sparse ones by
     their samples; `penumbra.sharpened` of each visibility that shadow rays tell of; of light with
-    texture, what it was made of; and what `contact.py` asks for."""
+    texture, what it was made of; what `contact.py` asks for; and of each light with peaks the
+    lesser luminance of the frame and of its history, 0 without one."""
 
     signals: list[NoisySignal]
     lengths: list[Float]
@@ -74,6 +75,7 @@ class Merged(NamedTuple):
     footprints: list[Float]
     parts: Pair | None = None
     contact: ContactFalloff | None = None
+    seen_twice: Sequence[Float] = ()
 
 
 def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovations: Innovations,
@@ -174,7 +176,14 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
         samples = merged[s].samples
         footprints.append(sharpened(
             falloff, lengths[layout.length(s)] if samples is None else samples))
-    return Merged(merged, lengths, fades, sparse_fades, footprints, parts, contact)
+    seen_twice = [_seen_twice(signals[s], innovations.signals[s], is_new)
+                  for s in layout.with_peaks]
+    return Merged(merged, lengths, fades, sparse_fades, footprints, parts, contact, seen_twice)
+
+
+def _seen_twice(signal: Signal, innovation: Signal, is_new: Bool) -> Float:
+    history = signal.luminance - innovation.luminance
+    return dr.select(is_new, 0, dr.minimum(signal.luminance, history))
 
 
 def expected_gain(change: Float, spread: Float) -> Float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -220,7 +220,7 @@ class Passes:
         before = [_counted(noisy) for noisy in merged.signals]
         if merged.parts is not None:
             before = [before[0]._replace(parts=merged.parts)]
-        before, energies = self._without_peaks(before, plane)
+        before, energies = self._without_peaks(before, merged.seen_twice, plane)
         filtered = self._through(self.output, before, plane, falloff, sigmas)
         if merged.parts is None:
             output = [noisy.signal for noisy in filtered]
@@ -233,7 +233,7 @@ class Passes:
                                plane)
         return [self.restore(before[0], filtered[0], around, innovations.lengths[0])]
 
-    def _without_peaks(self, before: list[NoisySignal],
+    def _without_peaks(self, before: list[NoisySignal], seen_twice: Sequence[Float],
                        plane: TangentPlane) -> tuple[list[NoisySignal], Energies | None]:
         """Signals without what `without_peaks` takes, and its energies, smoothed."""
         which = self.layout.with_peaks
@@ -241,7 +241,7 @@ class Passes:
             return before, None
         lights = [before[s].signal for s in which]
         self.buffer.store([dr.maximum(light.luminance, 0) for light in lights], gutters=True)
-        lights, energies = self.trim(lights, *self.peaks)
+        lights, energies = self.trim(lights, seen_twice, *self.peaks)
         before = list(before)
         for s, light in zip(which, lights, strict=True):
             before[s] = before[s]._replace(signal=light)

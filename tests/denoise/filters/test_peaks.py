@@ -15,14 +15,16 @@ AROUND = [*window(2), (0, 0)]
 
 
 def trimmed(light: np.ndarray, ids: np.ndarray,
-            kind: SignalKind = SignalKind.DIFFUSE) -> tuple[np.ndarray, np.ndarray]:
+            kind: SignalKind = SignalKind.DIFFUSE,
+            twice: float = 0) -> tuple[np.ndarray, np.ndarray]:
     """(h, w) red of what is left of a light whose red is twice its luminance, and its share."""
     stencil = Stencil(*light.shape, 2)
     planes = stencil.planes([0.0, -1.0])
     (x,), (id_,) = stencil.load(light.astype(np.float32)), stencil.load(ids.astype(np.int32))
     planes.store([x, stencil.Float(id_)], gutters=True)
-    (signal,), energies = without_peaks([kind], [Signal(2 * x, x, x)], planes.taps(AROUND, [0]),
-                                        planes.taps(AROUND, [1]).named(single))
+    (signal,), energies = without_peaks(
+        [kind], [Signal(2 * x, x, x)], [stencil.opaque(twice)], planes.taps(AROUND, [0]),
+        planes.taps(AROUND, [1]).named(single))
     assert signal.red is not None
     red, before, after = (stencil.image(Color(v, v, v))[..., 0] for v in (
         signal.red, energies.before[0], energies.after[0]))
@@ -41,6 +43,13 @@ def test_a_peak_keeps_so_many_times_the_mean_around(kind: SignalKind, times: flo
     np.testing.assert_allclose(red[3, 3], 2 * times * mean, rtol=1e-5)
     share[3, 3] = 1
     np.testing.assert_array_equal(share, 1)  # neighbours of a peak are none
+
+
+def test_a_peak_that_frame_and_history_have_keeps_three_quarters_of_the_lesser():
+    light = np.ones((7, 7))
+    light[3, 3] = 100
+    _, share = trimmed(light, np.zeros((7, 7)), twice=40)
+    np.testing.assert_allclose(share[3, 3], 0.75 * 40 / 100, rtol=1e-5)
 
 
 def test_another_object_or_the_dark_around_makes_no_peak():
