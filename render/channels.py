@@ -88,7 +88,7 @@ def _rgb(layer: str) -> tuple[str, ...]:
 
 MOST_GROUPS = 4  # of lights, each with a visibility of its own
 SUN = -2  # `light_id` of the environment's brightest spot, where it is a light of its own
-TRACING = 5
+TRACING = 6
 """Counts the changes of what frames hold. Raise it whenever the same scene, frame and seed give
 other values than rounding explains in any channel, of frames or references: sequences and data sets
 begun before are then not continued. One number serves both, since what changes the mean of light
@@ -99,6 +99,7 @@ under half-open masks mirrors and glass show lamps; the sun of a sky is a light 
 3: lamps in other layers of glass and masks have no noise (`tracer/layers.py`).
 4: of more than 64 lights fewer are cut, of more than 96 some speak for others (`clusters.py`).
 5: of several lights, lamps count in direct light as if they were picked for sure (`strata.py`).
+6: where lobes are narrow, unshadowed light has nothing of the sky (`resampling.py`).
 """
 
 _ROWS = (

@@ -97,6 +97,15 @@ class Appearance:
             alpha = dr.select(here, _alpha(bsdf, si, here), alpha)
         return dr.clip(alpha, 0, 1)
 
+    def may_be_narrow(self, alpha: float) -> bool:
+        """Whether some glossy lobe may be narrower than alpha."""
+        alphas = self._alphas.numpy()
+        return bool(self._varying) or bool(((alphas > 0) & (alphas < alpha)).any())
+
+    def is_narrow(self, si: mi.SurfaceInteraction3f, alpha: float) -> mi.Bool:
+        """Where all lobes are narrower than alpha, or there are none."""
+        return (self.roughness(si) < alpha) & dr.all(self.albedo(si) == 1)
+
     def normal(self, si: mi.SurfaceInteraction3f) -> mi.Vector3f:
         """Shading normal, as its material perturbs it: world space, unit length.
 

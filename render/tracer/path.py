@@ -15,6 +15,7 @@ glossy lobe chose it), not the glossy lobe's value alone: it costs nothing.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import drjit as dr
@@ -62,7 +63,8 @@ class Radiance:
 @dr.syntax
 def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
           max_depth: int, candidates: int = 1, lights: Lights | None = None,
-          behind: Replaced | Layer | None = None, tell_straight: bool = False) -> Radiance:
+          behind: Replaced | Layer | None = None, tell_straight: bool = False,
+          narrow: Callable[[mi.SurfaceInteraction3f], mi.Bool] | None = None) -> Radiance:
     """One path a lane.
 
     Args:
@@ -72,6 +74,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         candidates: points of the lights that a vertex compares before it sends its shadow ray.
         lights: those that direct light at the first hit is resampled from; None: it is by MIS too.
         behind: what `ray` and `pi` are behind, if anything. tell_straight: see `Radiance.straight`.
+        narrow: whether a surface is so, as of `resample_lights`.
     """
     context = mi.BSDFContext()
     o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
@@ -100,14 +103,15 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         smooth = first.is_valid() & mi.has_flag(first.bsdf().flags(), mi.BSDFFlags.Smooth)
         if dr.hint(behind is not None, mode="scalar"):
             smooth &= longest > 1
-        split = resample_lights(scene, first, sampler, smooth, lights)
+        split = resample_lights(scene, first, sampler, smooth, lights,
+                                None if narrow is None else narrow(first))
         if dr.hint(behind is not None, mode="scalar"):
             assert behind is not None
             split = split.through(behind.throughput)
         direct += split.direct
         arrived = mi.Color3f(split.direct)
 
-    while dr.hint(active, exclude=[scene, context, lights, longest, opacity, split, behind],
+    while dr.hint(active, exclude=[scene, context, lights, longest, opacity, split, behind, narrow],
                   max_iterations=max_depth, label="path"):
         si = pi.compute_surface_interaction(mi.Ray3f(o, d))
         bsdf = si.bsdf()

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import drjit as dr
@@ -30,6 +31,7 @@ from onespp.render.mitsuba.variant import mi
 from .camera_rays import camera_matrices
 from .gbuffer import GBUFFER, PrimaryHit
 from .lights.candidates import candidates_for
+from .lights.resampling import NARROW
 from .path import Radiance, sum_of_samples, trace
 from .replacement import Replaced, replaced
 from .replay import replay
@@ -124,7 +126,8 @@ class Renderer(View):
             planes = {}
             if set(channels) & _TRACED:
                 radiance = trace(scene, seen, pi, sampler, self.scene.max_depth,
-                                 self.candidates, self.lights_now, behind)
+                                 self.candidates, self.lights_now, behind,
+                                 narrow=self._narrow)
                 if behind and behind.other:
                     radiance = self._with_layers(radiance, behind, sampler)
                 unit = dr.opaque(mi.Float, self.stage.unit)
@@ -161,6 +164,15 @@ class Renderer(View):
                                  depth_per_length, behind)
                 planes |= {name: GBUFFER[name](hit) for name in channels if name in GBUFFER}
             return {name: planes[name] for name in channels}
+
+    @cached_property
+    def _narrow(self) -> Callable[[mi.SurfaceInteraction3f], mi.Bool] | None:
+        """Which surfaces see too little of the sky's strata; None where none does."""
+        appearance = self.stage.appearance
+        if not self.splits or self.stage.mi_scene.environment() is None or (
+                not appearance.may_be_narrow(NARROW)):
+            return None
+        return lambda si: appearance.is_narrow(si, NARROW)
 
     def _with_layers(self, radiance: Radiance, behind: Replaced, sampler: Sampler) -> Radiance:
         """Light with that of other layers: their lamps, and of one of them the rest, specular."""

@@ -30,6 +30,10 @@ Over the picks in g, omega has the mean 1 and y that of V_g, the share of U_g th
 of y over that of omega, over pixels that see the same of g, is V_g without noise of choice. What
 the BSDF's sample runs into is in no group; unshadowed, it is U - sum U_g.
 
+A sky's strata are tens of degrees wide. A lobe that is narrower sees one midpoint or none, and U
+would be bright in the wrong places. So where a surface has no other lobes, by `NARROW`, the sky is
+in no U and in no group; its light arrives all the same.
+
 Source: resampled importance sampling (Talbot et al. 2005) with the ratio estimator of Heitz et al.
 2018 ("Combining analytic direct illumination and stochastic shadows"), U by midpoints.
 """
@@ -52,6 +56,7 @@ from .sun import SUN_BIT, Sun
 
 DELTA = 0.1
 MOST_CALLED = 16  # BSDFs, up to which each compares strata in a call of its own
+NARROW = 0.2  # alpha, up to which lobes see too little of a sky's strata
 _DIMMEST = 1e-6  # share of l(U): a group that gives less has no visibility
 
 
@@ -60,15 +65,17 @@ class Lights:
     """All strata of a scene's lights, in the order of `scene.emitters()`, the sun's last.
 
     stratum: which part of which light it is (`stratum_word`). group: that it is in. sizes: strata
-    in each group, none where all lights are one. emitters: E, 1 or more. environment: index of that
-    emitter, E where there is none. sun: None where there is none. clusters: of each stratum, None
-    where no light speaks for others. surfaces: `ptr` of the BSDFs that shapes have. middles: of the
-    scene as it stands, None where each pixel is to ask the lights themselves.
+    in each group, none where all lights are one; of_sky: those of the sky. emitters: E, 1 or more.
+    environment: index of that emitter, E where there is none. sun: None where there is none.
+    clusters: of each stratum, None where no light speaks for others. surfaces: `ptr` of the BSDFs
+    that shapes have. middles: of the scene as it stands, None where each pixel is to ask the lights
+    themselves.
     """
 
     stratum: mi.UInt32
     group: mi.UInt32
     sizes: tuple[int, ...]
+    of_sky: tuple[int, ...]
     emitters: int
     environment: mi.UInt32
     sun: Sun | None = None
@@ -80,6 +87,11 @@ class Lights:
         """With the middles of the scene as it stands, if all of its lights have them."""
         return replace(self, middles=middles_of(scene, self.stratum, self.share(self.stratum),
                                                 self.clusters, self.sun))
+
+    def is_sky(self, k: mi.UInt32) -> mi.Bool:
+        """Whether stratum k is of the environment, but not its sun's."""
+        word = dr.gather(mi.UInt32, self.stratum, k)
+        return (word >> 8 == self.environment) & (word & SUN_BIT == 0)
 
     def share(self, stratum: mi.UInt32) -> mi.Float:
         """By how much the density of a stratum's light counts in weights: see `strata.py`."""
@@ -149,15 +161,16 @@ class Pick:
 
 @dr.syntax
 def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
-                    active: mi.Bool, lights: Any) -> DirectLight:
+                    active: mi.Bool, lights: Any, narrow: Any = None) -> DirectLight:
     """Direct light toward `si.wi` from light sampling, one shadow ray a lane.
 
     Args:
-        lights: `Lights`, of the scene.
+        lights: `Lights`, of the scene. narrow: mask of surfaces that have no lobes but such as
+            `NARROW` tells, None where there are none or there is no sky.
     """
     strata = dr.width(lights.stratum)
     choice, jitter = sampler.next_1d(), sampler.next_2d()
-    pick = _picked(scene, si, choice, active, lights)
+    pick = _picked(scene, si, choice, active, lights, narrow)
     picked, total = pick.stratum, pick.total
     p = dr.select(total <= 0, 1, (1 - DELTA) * strata * pick.luminance / total + DELTA) / strata
     stratum = dr.gather(mi.UInt32, lights.stratum, picked, active)
@@ -178,8 +191,9 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
         to_sun = lit & ((stratum & SUN_BIT) != 0)
     if dr.hint(len(lights.sizes) > 0, mode="scalar"):
         group = dr.gather(mi.UInt32, lights.group, picked, active)
+        told = active if narrow is None else active & ~(narrow & lights.is_sky(picked))
         sample = group_sample(lights, pick.by_group, group, total, mi.luminance(direct),
-                              pick.luminance / p, active)
+                              pick.luminance / p, told, narrow)
     return DirectLight(
         direct, pick.unshadowed,
         dr.select(lit, light.p - si.p, 0), shape_index(light.emitter.get_shape(), lit),
@@ -188,8 +202,9 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
 
 
 def _picked(scene: mi.Scene, si: mi.SurfaceInteraction3f, choice: mi.Float, active: mi.Bool,
-            lights: Lights) -> Pick:
-    """A stratum, by what the middles of all give; choice: random, in [0, 1).
+            lights: Lights, narrow: mi.Bool | None) -> Pick:
+    """A stratum, by what the middles of all give; choice: random, in [0, 1). narrow: as of
+    `resample_lights`.
 
     Where few BSDFs are, each compares all strata in one call of its own, which saves a call a
     stratum; the more there are, the more of such calls have to be recorded.
@@ -202,29 +217,31 @@ def _picked(scene: mi.Scene, si: mi.SurfaceInteraction3f, choice: mi.Float, acti
             scale = (1 if lights.clusters is None
                      else dr.gather(mi.Float, lights.clusters.scale, k, active))
             return middle.c, middle.weight(lights.share(stratum)), scale
-        return _compared(asked, choice, active, lights)
+        return _compared(asked, choice, active, lights, narrow)
 
+    # (The last mask of a call is that of its lanes.)
     def at_one(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f, choice: mi.Float,
-               active: mi.Bool) -> Pick:
+               narrow: mi.Bool | None, active: mi.Bool) -> Pick:
         def told(k: mi.UInt32, active: mi.Bool) -> tuple[mi.Color3f, mi.Float, mi.Float]:
             middle = middles.at(k, si.p)
             value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, si.to_local(middle.d), active)
             c = dr.select(active & (middle.pdf > 0), value * middle.light, 0) / middle.square
             return c, middle.weight(pdf), middle.scale
-        return _compared(told, choice, active, lights)
+        return _compared(told, choice, active, lights, narrow)
 
     def called(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f, choice: mi.Float,
-               active: mi.Bool) -> Pick:
+               narrow: mi.Bool | None, active: mi.Bool) -> Pick:
         is_lit = bsdf.ptr in surfaces and mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        return at_one(bsdf, si, choice, active) if is_lit else Pick.none(lights)
+        return at_one(bsdf, si, choice, narrow, active) if is_lit else Pick.none(lights)
 
     if len(surfaces) > MOST_CALLED:
-        return at_one(si.bsdf(), si, choice, active)
-    return dr.dispatch(si.bsdf(), called, si, choice, active)
+        return at_one(si.bsdf(), si, choice, narrow, active)
+    return dr.dispatch(si.bsdf(), called, si, choice, narrow, active)
 
 
 @dr.syntax
-def _compared(contribution: Any, choice: mi.Float, active: mi.Bool, lights: Any) -> Pick:
+def _compared(contribution: Any, choice: mi.Float, active: mi.Bool, lights: Any,
+              narrow: Any) -> Pick:
     """The same; contribution: of a stratum, where active: c, w, and s of `clusters.py`."""
     strata, groups = dr.width(lights.stratum), len(lights.sizes)
     # One pass: the sum, and a pick in proportion to luminance (a reservoir of one).
@@ -233,15 +250,19 @@ def _compared(contribution: Any, choice: mi.Float, active: mi.Bool, lights: Any)
     picked, picked_luminance = mi.UInt32(0), mi.Float(0)
     by_group = [mi.Color3f(0) for _ in lights.sizes]
     k = mi.UInt32(0)
-    while dr.hint(k < strata, exclude=[active, lights, contribution], max_iterations=strata,
-                  label="lights"):
+    while dr.hint(k < strata, exclude=[active, lights, contribution, narrow],
+                  max_iterations=strata, label="lights"):
         c, weight, scale = contribution(k, active)
         if dr.hint(lights.clusters is not None, mode="scalar"):
             c *= scale
-        unshadowed += c
+        told = mi.Color3f(c)
+        if dr.hint(narrow is not None, mode="scalar"):
+            told = dr.select(narrow & lights.is_sky(k), 0, c)
+        unshadowed += told
         if dr.hint(groups > 0, mode="scalar"):
             c = weight * c
-            by_group = added(by_group, dr.gather(mi.UInt32, lights.group, k, active), c)
+            by_group = added(by_group, dr.gather(mi.UInt32, lights.group, k, active),
+                             weight * told)
         luminance = mi.luminance(c)
         total += luminance
         taken, left = offered(left, luminance, total)
@@ -269,10 +290,13 @@ def added(lights: list[mi.Color3f], group: mi.UInt32, light: mi.Color3f) -> list
 
 def group_sample(lights: Lights, unshadowed: list[mi.Color3f], group: mi.UInt32,
                  total: mi.Float, arrived: mi.Float, possible: mi.Float,
-                 active: mi.Bool) -> GroupSample:
-    """What a ray to a group tells; arrived: v l(w c) / p_k. possible: l(w_k c_k) / p_k."""
+                 active: mi.Bool, narrow: mi.Bool | None) -> GroupSample:
+    """What a ray to a group tells; arrived: v l(w c) / p_k. possible: l(w_k c_k) / p_k. narrow: as
+    of `resample_lights`."""
     chance, of_group = mi.Float(0), mi.Float(0)
-    for g, size in enumerate(lights.sizes):
+    for g, (size, of_sky) in enumerate(zip(lights.sizes, lights.of_sky)):
+        if narrow is not None and of_sky:
+            size = size - dr.select(narrow, mi.Float(of_sky), 0)
         luminance, is_it = mi.luminance(unshadowed[g]), group == g
         of_group = dr.select(is_it, luminance, of_group)
         share = (1 - DELTA) * luminance / total + DELTA * (size / sum(lights.sizes))

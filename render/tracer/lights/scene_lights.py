@@ -64,8 +64,11 @@ def find_lights(stage: MitsubaScene) -> Lights:
         luminances = np.stack([luminances[e].sum(0) for e, _ in clusters])
     stratum, group, sizes, speaking = _in_strata(lights, clusters, luminances, delta)
     environment = next((i for i, e in enumerate(emitters) if e.is_environment()), len(emitters))
-    return Lights(stratum, group, sizes, max(1, len(emitters)), dr.opaque(mi.UInt32, environment),
-                  sun, speaking, frozenset(s.bsdf().ptr for s in stage.mi_scene.shapes()))
+    is_sky = stratum.numpy() >> 7 == 2 * environment  # without `SUN_BIT`
+    of_sky = np.bincount(group.numpy()[is_sky], minlength=len(sizes))
+    return Lights(stratum, group, sizes, tuple(map(int, of_sky)), max(1, len(emitters)),
+                  dr.opaque(mi.UInt32, environment), sun, speaking,
+                  frozenset(s.bsdf().ptr for s in stage.mi_scene.shapes()))
 
 
 def _in_strata(lights: np.ndarray, clusters: list[tuple[np.ndarray, float]],

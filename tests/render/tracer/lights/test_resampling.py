@@ -15,6 +15,7 @@ from onespp.render.tracer.path import LARGEST_VISIBILITY, Radiance, _with_split
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 from tests.render.tracer.test_renderer import small_scene
+from tests.support.metal_under_sky import LAMP, metal_under_sky
 from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
 
 
@@ -92,3 +93,34 @@ def test_visibility_is_bounded_where_unshadowed_light_underflows():
     found = _with_split(radiance, mi.Color3f(3.0), split)
     assert found.visibility is not None
     np.testing.assert_allclose(found.visibility.numpy(), [LARGEST_VISIBILITY, 0, 1.5], rtol=1e-6)
+
+
+@pytest.mark.parametrize("lamps", [(), (LAMP,)])
+def test_a_sky_is_in_no_unshadowed_light_of_narrow_lobes(lamps, monkeypatch):
+    """Whose midpoints they miss; all else of a frame is to the bit as if they did not."""
+    frames = [Renderer(metal_under_sky(0.08, *lamps), 24, 32, direct="resampled") for _ in range(2)]
+    channels = frames[0].channels
+    told = frames[0].frame(1, 0, channels)
+    monkeypatch.setattr("onespp.render.tracer.renderer.NARROW", 0.0)
+    whole = frames[1].frame(1, 0, channels)
+    ball = told["id"] == frames[0].scene.object_names.index("ball")
+    changed = {"unshadowed", "visibility", "group", "group_sample", "unshadowed0", "unshadowed1"}
+    for name in channels:
+        same = told[name] == whole[name]
+        assert same[~ball].all(), name
+        assert name in changed or same.all(), name
+    assert whole["unshadowed"][ball].max() > 5 * whole["unshadowed"][ball].mean()
+    if not lamps:
+        assert not told["unshadowed"][ball].any()
+        assert not told["visibility"][ball].any()
+        return
+    of_sky = {0, 1} - {int(np.argmax([told[f"unshadowed{g}"][ball].sum() for g in (0, 1)]))}
+    (sky,) = of_sky
+    assert not told[f"unshadowed{sky}"][ball].any()
+    assert (told["group"][ball] != sky).all()
+    assert (whole["group"][ball] == sky).any()
+
+
+def test_wider_lobes_keep_it():
+    assert Renderer(metal_under_sky(0.25), 24, 32, direct="resampled")._narrow is None
+    assert Renderer(catalog.load("room"), 12, 16, direct="resampled")._narrow is None
