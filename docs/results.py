@@ -558,7 +558,7 @@ def own_command(name: str, plan: Plan) -> str:
               help="Of box and room.")
 @click.option("--others-spp", default=64, show_default=True, metavar="N",
               help="Of the scenes that nothing was tuned on, and of all kinds of light.")
-@click.option("--hard-spp", default=64, show_default=True, metavar="N",
+@click.option("--hard-spp", default=1024, show_default=True, metavar="N",
               help="Of the hard scenes.")
 @click.option("--seed", default=0, show_default=True, metavar="N", help="Of box and room.")
 @click.option("--hard", "hard_names", multiple=True, metavar="NAME", type=click.Choice([*HARD]),
