@@ -1,17 +1,24 @@
-"""Rare bright pixels before the last filter: they leave no blobs, and most of their light is kept.
+"""Rare bright pixels: they leave no blobs, and most of their light is kept.
 
 A path that meets a lamp by a rare chance, as by way of a glossy floor, is a pixel many times as
 bright as those around. A filter that weighs by noise spreads it over its few pixels, as a blob, or
-keeps it from some of them, and so loses light. Symbols: d luminance of the frame, h of its history,
-0 without one, x of the two merged; m the mean of x over those of the 24 pixels around that see the
-same object, F the last filter, S a smoothing by geometry alone, as wide as that of the innovation.
+keeps it from some of them, and so loses light; and in a history it is for many frames a pixel that
+is not as bright any more as to be told from others. Symbols: d luminance of the frame, h of its
+history, 0 without one, x of what is judged; m the mean of x over those of the 24 pixels around that
+see the same object, F the last filter, S a smoothing by geometry alone, as wide as that of the
+innovation.
 
-    x' = min(x, max(t m, 3/4 min(d, h))),   output = F[x'] min(S[x] / S[x'], 6)
+    x' = min(x, max(t m, u min(d, h)))
 
-with t = 2.5 of diffuse light, whose caustics are bright for a reason, and 1.5 of glossy light. What
-both have is no rare chance, as a highlight on a small bent thing. What is taken has its share in S
-of the light all around. Light is lost where the limit, 6, is reached: where S reaches only few
-pixels, as on leaves.
+    before the last filter    x = merged history,   output = F[x'] min(S[x] / S[x'], 6)
+        diffuse light t = 2.5 (its caustics are bright for a reason), glossy t = 1.5; u = 3/4
+    before history            x = d,                d <- x' min(S[x] / S[x'], 6)
+        glossy light t = 4; u = 3
+
+What frame and history both have is no rare chance, as a highlight on a small bent thing. What is
+taken has its share in S of the light all around. Light is lost where the limit, 6, is reached:
+where S reaches only few pixels, as on leaves. Before history the light of other layers stays as it
+is.
 
 Source: our own, of two known parts: outliers by their neighbours (as in GAMES202, lecture 13, here
 by the mean alone), and the ratio of two smoothings (Heitz et al. 2018), which gives light back.
@@ -19,7 +26,7 @@ by the mean alone), and the ratio of two smoothings (Heitz et al. 2018), which g
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import drjit as dr
@@ -31,9 +38,17 @@ from onespp.denoise.jit.taps import Taps
 
 RADIUS = 2                     # pixels
 MOST = 6.0                     # that light is multiplied by
-OUTLIER = {SignalKind.DIFFUSE: 2.5, SignalKind.GLOSSY: 1.5}
-"""t, times the mean of those around."""
-_SEEN_TWICE = 0.75             # of what frame and history both have, which is left
+
+
+class Limits(NamedTuple):
+    """What is left of a pixel: t of each kind, and u."""
+
+    around: Mapping[SignalKind, float]
+    seen_twice: float
+
+
+BEFORE_FILTER = Limits({SignalKind.DIFFUSE: 2.5, SignalKind.GLOSSY: 1.5}, 0.75)
+BEFORE_HISTORY = Limits({SignalKind.GLOSSY: 4.0}, 3.0)
 
 
 class Energies(NamedTuple):
@@ -43,8 +58,8 @@ class Energies(NamedTuple):
     after: list[Float]
 
 
-def without_peaks(kinds: Sequence[SignalKind], lights: list[Signal], seen_twice: list[Float],
-                  luminances: Taps[list[Float]],
+def without_peaks(limits: Limits, kinds: Sequence[SignalKind], lights: list[Signal],
+                  seen_twice: list[Float], luminances: Taps[list[Float]],
                   ids: Taps[Float]) -> tuple[list[Signal], Energies]:
     """Each light without its peaks, x', and its energies.
 
@@ -62,7 +77,8 @@ def without_peaks(kinds: Sequence[SignalKind], lights: list[Signal], seen_twice:
         luminances.next()
     shares = []
     for kind, twice, x, total in zip(kinds, seen_twice, center, sums, strict=True):
-        least = dr.maximum(OUTLIER[kind] * total / dr.maximum(count, 1), _SEEN_TWICE * twice)
+        least = dr.maximum(limits.around[kind] * total / dr.maximum(count, 1),
+                           limits.seen_twice * twice)
         is_peak = (x > least) & (least > 0)
         shares.append(dr.select(is_peak, least / dr.select(is_peak, x, 1), 1))
     kept = [mapped(lambda v, s=share: v * s, light) for light, share in zip(lights, shares)]
@@ -70,7 +86,7 @@ def without_peaks(kinds: Sequence[SignalKind], lights: list[Signal], seen_twice:
 
 
 def with_their_light(lights: list[Signal], around: Energies) -> list[Signal]:
-    """What the last filter made of `without_peaks`, with its light again; around: smoothed."""
+    """What was made of `without_peaks`, with its light again; around: smoothed."""
     whole = [dr.select(after > 0, dr.clip(before / dr.select(after > 0, after, 1), 1, MOST), 1)
              for before, after in zip(around.before, around.after)]
     return [mapped(lambda v, f=factor: v * f, light) for light, factor in zip(lights, whole)]

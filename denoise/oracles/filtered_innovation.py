@@ -531,10 +531,10 @@ def contact(frame: Frame, m, name: str, length: np.ndarray) -> np.ndarray:
     return (near("blocker_distance", seen) + of_paths) * trust
 
 
-def without_peaks(frame: Frame, image: np.ndarray, twice: np.ndarray, most: float, levels: int,
+def without_peaks(frame: Frame, image: np.ndarray, least: np.ndarray, most: float, levels: int,
                   m) -> tuple:
-    """Light without what is above `most` times the mean of the same object around and above three
-    quarters of what was seen twice, and the factor that gives it back."""
+    """Light without what is above `most` times the mean of the same object around and above
+    `least`, and the factor that gives it back."""
     x, shape = np.maximum(lum(image), 0), frame["id"].shape
     pixels = pixels_of(frame, m, x=x)
     count, total = np.zeros(shape), np.zeros(shape)
@@ -545,7 +545,7 @@ def without_peaks(frame: Frame, image: np.ndarray, twice: np.ndarray, most: floa
         same = (p.id == q.id) & (p.id >= 0)
         count[where] += same
         total[where] += q.x * same
-    least = np.maximum(most * total / np.maximum(count, 1), 0.75 * twice)
+    least = np.maximum(most * total / np.maximum(count, 1), least)
     share = np.where((least > 0) & (x > least), least / np.maximum(x, 1e-30), 1)
     before, after = np.moveaxis(smooth(frame, np.stack([x, x * share], -1), np.ones(x.shape),
                                        levels, m), -1, 0)
@@ -660,8 +660,9 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
             light_threshold = np.where(at_rest(previous, frame), 4, 1) * m.noise_threshold
             if objects_at_rest(previous, frame).all():
                 m = replace(m, min_gain=m.min_gain / 2)
+        signals = dict(signals)
         if "V" in signals:
-            signals = {**signals, "V": of_lit_neighbours(frame, signals["V"], m)}
+            signals["V"] = of_lit_neighbours(frame, signals["V"], m)
         found = np.zeros(frame["id"].shape, bool)
         ns = {length_of(frame, name): np.ones(found.shape) for name in signals}
         if previous is not None:
@@ -689,6 +690,13 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
                 if name in "LG":
                     h, s2 = h * lights.ratio, s2 * luminance(lights.ratio) ** 2
                 e = np.where(found[..., None], d - omega[..., None] * h, 0)
+            if name == "G" and "L" in signals and has_peaks:
+                twice = np.where(found, np.minimum(lum(d), lum(d - e)), 0)
+                trimmed, factor = without_peaks(frame, d, 3 * twice, 4, m.innovation_levels, m)
+                e = np.where(found[..., None], e + trimmed * factor[..., None] - d, 0)
+                d = signals[name] = trimmed * factor[..., None]
+                spatial = spatial_variance(frame, d, m)
+            if previous is not None:
                 energy = smooth(frame, lum(e)[..., None] ** 2, found, 2, m)[..., 0]
             narrow = narrowness(frame, told, m) if follows else np.zeros(found.shape)
             if follows and len(groups) > 1:
@@ -784,7 +792,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
             if name in "LG" and has_peaks:
                 wide = m.innovation_levels if "L" in signals else m.sharp_innovation_levels
                 twice = np.where(found, np.minimum(lum(d), lum(d - e)), 0)
-                before, factor = without_peaks(frame, history, twice,
+                before, factor = without_peaks(frame, history, 0.75 * twice,
                                                {"L": 2.5, "G": 1.5}[name], wide, m)
             fade = np.ones(found.shape) if name == "G" else fade
             out[name] = guided(frame, before, s2, levels, sigmas, fade, narrow, m,

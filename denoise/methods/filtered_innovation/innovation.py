@@ -60,7 +60,8 @@ of h compares luminance too,
 
 sigma being less for glossy light the narrower its lobe is, down to a mirror's at roughness 0, and
 the last level of other light fades out as the history grows. A pixel of another object counts for
-two fifths. In scenes with glossy surfaces light has no rare bright pixels before it: `peaks.py`.
+two fifths. In scenes with glossy surfaces light has no rare bright pixels before it, nor glossy
+light of the surface itself before it is compared with history: `peaks.py`.
 Visibility is filtered no farther than shadows are soft, and so are its e and Q: `penumbra.py`. The
 last filter of other light is narrower where other surfaces are close: `contact.py`.
 Where neither history nor neighbours can know, a pixel's own rays decide: in slits and hard shadows
@@ -107,6 +108,7 @@ from .texture import AtRest, FromHistory, choose, found_at_rest, missed
 
 _TIE = 1e-6                    # excess of a history that is no better nor worse
 _NO_HISTORY = -3e14            # 1/z of a pixel without history
+_NEW = 1.5                     # n below which there is none
 
 
 class ShadowInnovation(NamedTuple):
@@ -230,6 +232,21 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
                        None if lobes is None else turned(lobes, surface.normal, place),
                        _unrest(stencil, shadows, place), place.rests, misses, at_rest, spatial,
                        mapped(lambda near: falloff_scale * near, around.contact))
+
+
+def seen_twice(signals: list[Signal], innovations: list[Signal], length: Float) -> list[Float]:
+    """The lesser luminance of frame and history of each, 0 without one; length: n before a change.
+    """
+    return [dr.select(length < _NEW, 0, dr.minimum(d.luminance, d.luminance - e.luminance))
+            for d, e in zip(signals, innovations, strict=True)]
+
+
+def renewed(before: list[Signal], after: list[Signal], innovations: list[Signal],
+            length: Float) -> tuple[list[Signal], list[Float]]:
+    """Innovations of signals that were changed, and l(e)^2; length: as of `seen_twice`."""
+    news = [mapped(lambda b, a, e: dr.select(length < _NEW, e, e + (a - b)), *one)
+            for one in zip(before, after, innovations, strict=True)]
+    return news, [dr.minimum(dr.square(e.luminance), MAX_ENERGY) for e in news]
 
 
 def _brought_up_to_date(old: NoisySignal, ratio: Vector3) -> NoisySignal:

@@ -147,6 +147,12 @@ class SignalLayout:
                 if self.has_peaks and kind is not SignalKind.VISIBILITY]
 
     @property
+    def with_peaks_of_frame(self) -> list[int]:
+        """Those whose peaks are told before history: light that the surface's own lobes reflect."""
+        own = self.has_peaks and SignalKind.DIFFUSE in self.kinds
+        return [s for s, kind in enumerate(self.kinds) if own and kind is SignalKind.GLOSSY]
+
+    @property
     def visibilities(self) -> list[int]:
         """Which signals are visibility."""
         return [s for s, kind in enumerate(self.kinds) if kind is SignalKind.VISIBILITY]

@@ -12,7 +12,7 @@ from onespp.denoise.filters.contact import ContactFalloff, contact_falloff
 from onespp.denoise.filters.penumbra import sharpened
 from onespp.denoise.inputs.signals import LARGEST_VISIBILITY, Chosen, Signal, SignalKind
 from onespp.denoise.inputs.surface import TangentPlane
-from onespp.denoise.jit.arrays import Bool, Float
+from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.structure import mapped
 
@@ -24,7 +24,7 @@ from .change import (
     lengths_left,
     threshold_of_light,
 )
-from .innovation import Innovations, ShadowInnovation, weights_of
+from .innovation import Innovations, ShadowInnovation, seen_twice, weights_of
 from .layout import NoisySignal, Pair, SignalLayout, Smoothed
 from .noise import MAX_ENERGY, NO_SAMPLE, PRIOR_VARIANCE, spatial_variances
 from .output import FEWEST_SAMPLES, fade_out
@@ -176,14 +176,9 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
         samples = merged[s].samples
         footprints.append(sharpened(
             falloff, lengths[layout.length(s)] if samples is None else samples))
-    seen_twice = [_seen_twice(signals[s], innovations.signals[s], is_new)
-                  for s in layout.with_peaks]
-    return Merged(merged, lengths, fades, sparse_fades, footprints, parts, contact, seen_twice)
-
-
-def _seen_twice(signal: Signal, innovation: Signal, is_new: Bool) -> Float:
-    history = signal.luminance - innovation.luminance
-    return dr.select(is_new, 0, dr.minimum(signal.luminance, history))
+    twice = seen_twice([signals[s] for s in layout.with_peaks],
+                       [innovations.signals[s] for s in layout.with_peaks], innovations.lengths[0])
+    return Merged(merged, lengths, fades, sparse_fades, footprints, parts, contact, twice)
 
 
 def expected_gain(change: Float, spread: Float) -> Float:

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import drjit as dr
 
 from onespp.denoise.filters.contact import Contact, black_contact, share_of_line
-from onespp.denoise.filters.peaks import RADIUS, Energies, with_their_light, without_peaks
+from onespp.denoise.filters.peaks import (
+    BEFORE_FILTER,
+    BEFORE_HISTORY,
+    RADIUS,
+    Energies,
+    Limits,
+    with_their_light,
+    without_peaks,
+)
 from onespp.denoise.filters.tangent_plane import RING, Roughness, SurfaceTap, loosened, roughness
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
 from onespp.denoise.inputs.shadow_rays import ShadowRays
@@ -21,7 +29,15 @@ from onespp.denoise.jit.step import Step
 from onespp.denoise.jit.structure import arrays_of, build, flatten
 from onespp.denoise.jit.taps import Taps, window
 
-from .innovation import Innovations, choose_histories, find_innovations, pack_history, to_smooth
+from .innovation import (
+    Innovations,
+    choose_histories,
+    find_innovations,
+    pack_history,
+    renewed,
+    seen_twice,
+    to_smooth,
+)
 from .layout import NoisySignal, PlaneRule, SignalLayout, Smoothed
 from .merging import Merged, merge
 from .output import FEWEST_SAMPLES, OutputFalloff, output_level
@@ -60,13 +76,39 @@ class Level:
 
 
 @dataclass(frozen=True)
+class PeakPasses:
+    """What takes peaks out of some signals, and gives their light back (`filters/peaks.py`).
+
+    Attributes:
+        signals: which. window: of their luminance and of object ID. trim: `without_peaks` of them.
+        energies: levels of the smoothing.
+    """
+
+    signals: list[int]
+    window: tuple[Taps[list[Float]], Taps[Float]]
+    trim: Step[..., tuple[list[Signal], Energies]]
+    energies: list[Level]
+
+    @staticmethod
+    def make(limits: Limits, signals: list[int], layout: SignalLayout, buffer: Planes,
+             surfaces: Planes, energies: Callable[[int, int], Level]) -> PeakPasses:
+        kinds = [layout.kinds[s] for s in signals]
+        levels = layout.innovation_levels if signals else 0
+        return PeakPasses(
+            signals, (buffer.taps(_WINDOW, range(len(signals))),
+                      surfaces.taps(_WINDOW, [_ID]).named(single)),
+            Step(lambda *a: without_peaks(limits, kinds, *a)),
+            [energies(i, 2 * len(signals)) for i in range(levels)])
+
+
+@dataclass(frozen=True)
 class Passes:
     """The planes and recorded steps of a layout, and the passes that they are.
 
     Attributes:
         surfaces: planes of object ID, 1/z, 1/z of what has a history, and `Roughness.share`.
         buffer: planes of what is being smoothed or filtered, see `layout.py`.
-        peaks: of luminance and of object ID, of the window of `filters/peaks.py`.
+        peaks_of_frame, peaks_of_history: before history, and before the last filter.
         around: surfaces of the 3x3 pixels around. ring: of shares of roughness.
         fill: of unlit pixels' visibility. line_taps: of `black_contact`.
     """
@@ -91,10 +133,11 @@ class Passes:
     smoothing: list[Level]
     merge: Step[..., Merged]
     output: list[Level]
-    peaks: tuple[Taps[list[Float]], Taps[Float]]
-    trim: Step[..., tuple[list[Signal], Energies]]
-    energies: list[Level]
+    peaks_of_frame: PeakPasses
+    peaks_of_history: PeakPasses
     make_whole: Step[..., list[Signal]]
+    twice: Step[..., list[Float]]
+    renew: Step[..., tuple[list[Signal], list[Float]]]
     residual: Step[..., Residual]
     residual_smoothing: list[Level]
     restore: Step[..., Signal]
@@ -114,8 +157,8 @@ class Passes:
             return Level.make(i, buffer, len(rules), surfaces, _VALID_INVERSE_DEPTH,
                               lambda *a: smooth_level(rules, *a))
 
-        def energies(i: int) -> Level:
-            rules = [PlaneRule(layout.innovation_levels)] * (2 * len(layout.with_peaks))
+        def energies(i: int, count: int) -> Level:
+            rules = [PlaneRule(layout.innovation_levels)] * count
             return Level.make(i, buffer, len(rules), surfaces, _INVERSE_DEPTH,
                               lambda *a: smooth_level(rules, *a))
 
@@ -151,11 +194,11 @@ class Passes:
             [smoothing(i) for i in range(layout.innovation_levels)],
             Step(lambda *a: merge(stencil, layout, *a)),
             [output(i) for i in range(layout.deepest_output)],
-            (buffer.taps(_WINDOW, range(len(layout.with_peaks))),
-             surfaces.taps(_WINDOW, [_ID]).named(single)),
-            Step(lambda *a: without_peaks([layout.kinds[s] for s in layout.with_peaks], *a)),
-            [energies(i) for i in range(layout.innovation_levels)] if layout.with_peaks else [],
+            PeakPasses.make(BEFORE_HISTORY, layout.with_peaks_of_frame, layout, buffer, surfaces,
+                            energies),
+            PeakPasses.make(BEFORE_FILTER, layout.with_peaks, layout, buffer, surfaces, energies),
             Step(with_their_light),
+            Step(seen_twice), Step(renewed),
             Step(residual),
             [Level.make(i, buffer, len(RESIDUAL_RULES), surfaces, _VALID_INVERSE_DEPTH,
                         lambda *a: smooth_level(RESIDUAL_RULES, *a))
@@ -207,6 +250,26 @@ class Passes:
             return innovations
         return self.choose(innovations, self._through(self.choice, excess, plane))
 
+    def without_peaks_of_frame(self, signals: list[Signal], innovations: Innovations,
+                               plane: TangentPlane) -> tuple[list[Signal], Innovations]:
+        """Signals of the frame whose peaks have given their light to all around, and innovations
+        of these."""
+        which = self.peaks_of_frame.signals
+        if not which:
+            return signals, innovations
+        before, changes = ([of_all[s] for s in which]
+                           for of_all in (signals, innovations.signals))
+        length = innovations.lengths[0]
+        trimmed, energies = self._trimmed(self.peaks_of_frame, signals,
+                                          self.twice(before, changes, length), plane)
+        whole = self.make_whole([trimmed[s] for s in which], energies)
+        news = self.renew(before, whole, changes, length)
+        signals, changes = list(signals), list(innovations.signals)
+        powers = list(innovations.energies)
+        for s, light, e, power in zip(which, whole, *news, strict=True):
+            signals[s], changes[s], powers[s] = light, e, power
+        return signals, innovations._replace(signals=changes, energies=powers)
+
     def smooth_innovations(self, innovations: Innovations, plane: TangentPlane) -> Smoothed:
         """Q, S and W of the innovation, over pixels that have a history."""
         return self._through(self.smoothing, to_smooth(self.layout, innovations), plane,
@@ -220,7 +283,9 @@ class Passes:
         before = [_counted(noisy) for noisy in merged.signals]
         if merged.parts is not None:
             before = [before[0]._replace(parts=merged.parts)]
-        before, energies = self._without_peaks(before, merged.seen_twice, plane)
+        lights, energies = self._trimmed(self.peaks_of_history, [noisy.signal for noisy in before],
+                                         list(merged.seen_twice), plane)
+        before = [noisy._replace(signal=light) for noisy, light in zip(before, lights)]
         filtered = self._through(self.output, before, plane, falloff, sigmas)
         if merged.parts is None:
             output = [noisy.signal for noisy in filtered]
@@ -233,19 +298,17 @@ class Passes:
                                plane)
         return [self.restore(before[0], filtered[0], around, innovations.lengths[0])]
 
-    def _without_peaks(self, before: list[NoisySignal], seen_twice: Sequence[Float],
-                       plane: TangentPlane) -> tuple[list[NoisySignal], Energies | None]:
-        """Signals without what `without_peaks` takes, and its energies, smoothed."""
-        which = self.layout.with_peaks
-        if not which:
-            return before, None
-        lights = [before[s].signal for s in which]
+    def _trimmed(self, peaks: PeakPasses, signals: list[Signal], seen_twice: list[Float],
+                 plane: TangentPlane) -> tuple[list[Signal], Energies | None]:
+        """Signals without peaks, and the energies of those that may have some, smoothed."""
+        if not peaks.signals:
+            return signals, None
+        lights = [signals[s] for s in peaks.signals]
         self.buffer.store([dr.maximum(light.luminance, 0) for light in lights], gutters=True)
-        lights, energies = self.trim(lights, seen_twice, *self.peaks)
-        before = list(before)
-        for s, light in zip(which, lights, strict=True):
-            before[s] = before[s]._replace(signal=light)
-        return before, self._through(self.energies, energies, plane)
+        lights, energies = peaks.trim(lights, seen_twice, *peaks.window)
+        trimmed = dict(zip(peaks.signals, lights, strict=True))
+        return ([trimmed.get(s, signal) for s, signal in enumerate(signals)],
+                self._through(peaks.energies, energies, plane))
 
     def _through(self, levels: list[Level], values: T, plane: TangentPlane,
                  *arguments: Any) -> T:

@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from onespp.denoise.filters.peaks import Energies, with_their_light, without_peaks
+from onespp.denoise.filters.peaks import (
+    BEFORE_FILTER,
+    BEFORE_HISTORY,
+    Energies,
+    Limits,
+    with_their_light,
+    without_peaks,
+)
 from onespp.denoise.inputs.signals import Signal, SignalKind
 from onespp.denoise.jit.arrays import Color
 from onespp.denoise.jit.grid import Stencil, single
@@ -15,15 +22,15 @@ AROUND = [*window(2), (0, 0)]
 
 
 def trimmed(light: np.ndarray, ids: np.ndarray,
-            kind: SignalKind = SignalKind.DIFFUSE,
-            twice: float = 0) -> tuple[np.ndarray, np.ndarray]:
+            kind: SignalKind = SignalKind.DIFFUSE, twice: float = 0,
+            limits: Limits = BEFORE_FILTER) -> tuple[np.ndarray, np.ndarray]:
     """(h, w) red of what is left of a light whose red is twice its luminance, and its share."""
     stencil = Stencil(*light.shape, 2)
     planes = stencil.planes([0.0, -1.0])
     (x,), (id_,) = stencil.load(light.astype(np.float32)), stencil.load(ids.astype(np.int32))
     planes.store([x, stencil.Float(id_)], gutters=True)
     (signal,), energies = without_peaks(
-        [kind], [Signal(2 * x, x, x)], [stencil.opaque(twice)], planes.taps(AROUND, [0]),
+        limits, [kind], [Signal(2 * x, x, x)], [stencil.opaque(twice)], planes.taps(AROUND, [0]),
         planes.taps(AROUND, [1]).named(single))
     assert signal.red is not None
     red, before, after = (stencil.image(Color(v, v, v))[..., 0] for v in (
@@ -32,12 +39,14 @@ def trimmed(light: np.ndarray, ids: np.ndarray,
     return red, after / np.maximum(light, 1e-30)
 
 
-@pytest.mark.parametrize(("kind", "times"),
-                         [(SignalKind.DIFFUSE, 2.5), (SignalKind.GLOSSY, 1.5)])
-def test_a_peak_keeps_so_many_times_the_mean_around(kind: SignalKind, times: float):
+@pytest.mark.parametrize(("limits", "kind", "times"), [
+    (BEFORE_FILTER, SignalKind.DIFFUSE, 2.5), (BEFORE_FILTER, SignalKind.GLOSSY, 1.5),
+    (BEFORE_HISTORY, SignalKind.GLOSSY, 4)])
+def test_a_peak_keeps_so_many_times_the_mean_around(limits: Limits, kind: SignalKind,
+                                                    times: float):
     light = np.ones((7, 7))
     light[3, 3], light[3, 4] = 100, 1.25
-    red, share = trimmed(light, np.zeros((7, 7)), kind)
+    red, share = trimmed(light, np.zeros((7, 7)), kind, limits=limits)
     mean = (23 + 1.25) / 24
     np.testing.assert_allclose(share[3, 3], times * mean / 100, rtol=1e-5)
     np.testing.assert_allclose(red[3, 3], 2 * times * mean, rtol=1e-5)
@@ -45,11 +54,13 @@ def test_a_peak_keeps_so_many_times_the_mean_around(kind: SignalKind, times: flo
     np.testing.assert_array_equal(share, 1)  # neighbours of a peak are none
 
 
-def test_a_peak_that_frame_and_history_have_keeps_three_quarters_of_the_lesser():
+@pytest.mark.parametrize(("limits", "share"), [(BEFORE_FILTER, 0.75), (BEFORE_HISTORY, 3)])
+def test_a_peak_that_frame_and_history_have_keeps_a_share_of_the_lesser(limits: Limits,
+                                                                        share: float):
     light = np.ones((7, 7))
     light[3, 3] = 100
-    _, share = trimmed(light, np.zeros((7, 7)), twice=40)
-    np.testing.assert_allclose(share[3, 3], 0.75 * 40 / 100, rtol=1e-5)
+    _, left = trimmed(light, np.zeros((7, 7)), SignalKind.GLOSSY, 20, limits)
+    np.testing.assert_allclose(left[3, 3], share * 20 / 100, rtol=1e-5)
 
 
 def test_another_object_or_the_dark_around_makes_no_peak():
