@@ -859,7 +859,7 @@ def length_left(name: str, wide: np.ndarray, q: np.ndarray, energy: np.ndarray,
         color = np.maximum(wide[..., 0] ** 2, wide[..., 2] ** 2 / 4)
         size = np.maximum(size, color / 4 if name == "L" else color)
     alike = np.minimum(luminance2, energy) / np.maximum(np.maximum(luminance2, energy), 1e-20)
-    q = energy / 48 if name == "G" else q
+    q = energy / 96 if name == "G" else q
     certain = 1 - threshold * q * (1 - alike**4) / np.maximum(size, 1e-20)
     size = size * np.maximum(certain, 0) ** 2
     size = np.minimum(size, energy**2 / np.maximum(size, 1e-20))
