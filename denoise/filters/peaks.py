@@ -13,12 +13,12 @@ innovation.
     before the last filter    x = merged history,   output = F[x'] min(S[x] / S[x'], 6)
         diffuse light t = 2.5 (its caustics are bright for a reason), glossy t = 1.5; u = 3/4
     before history            x = d,                d <- x' min(S[x] / S[x'], 6)
-        glossy light t = 4; u = 3
+        glossy light of narrow lobes (roughness below 0.2) t = 4; u = 3
 
 What frame and history both have is no rare chance, as a highlight on a small bent thing. What is
 taken has its share in S of the light all around. Light is lost where the limit, 6, is reached:
-where S reaches only few pixels, as on leaves. Before history the light of other layers stays as it
-is.
+where S reaches only few pixels, as on leaves. Wider lobes meet lamps often, and what is taken from
+them before history is missed there; the light of other layers stays as it is, too.
 
 Source: our own, of two known parts: outliers by their neighbours (as in GAMES202, lecture 13, here
 by the mean alone), and the ratio of two smoothings (Heitz et al. 2018), which gives light back.

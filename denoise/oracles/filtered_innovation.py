@@ -690,8 +690,9 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
                 if name in "LG":
                     h, s2 = h * lights.ratio, s2 * luminance(lights.ratio) ** 2
                 e = np.where(found[..., None], d - omega[..., None] * h, 0)
-            if name == "G" and "L" in signals and has_peaks:
+            if name == "G" and "L" in signals and has_peaks and "roughness" in frame:
                 twice = np.where(found, np.minimum(lum(d), lum(d - e)), 0)
+                twice = np.where(roughness_of(frame) < 0.2, twice, 1e36)
                 trimmed, factor = without_peaks(frame, d, 3 * twice, 4, m.innovation_levels, m)
                 e = np.where(found[..., None], e + trimmed * factor[..., None] - d, 0)
                 d = signals[name] = trimmed * factor[..., None]
@@ -859,7 +860,7 @@ def length_left(name: str, wide: np.ndarray, q: np.ndarray, energy: np.ndarray,
         color = np.maximum(wide[..., 0] ** 2, wide[..., 2] ** 2 / 4)
         size = np.maximum(size, color / 4 if name == "L" else color)
     alike = np.minimum(luminance2, energy) / np.maximum(np.maximum(luminance2, energy), 1e-20)
-    q = energy / 96 if name == "G" else q
+    q = energy / 48 if name == "G" else q
     certain = 1 - threshold * q * (1 - alike**4) / np.maximum(size, 1e-20)
     size = size * np.maximum(certain, 0) ** 2
     size = np.minimum(size, energy**2 / np.maximum(size, 1e-20))

@@ -47,7 +47,7 @@ from .layout import SignalLayout, Smoothed
 MIN_ENERGY = 1e-20             # square of a luminance that is taken for 0
 LEAST_NOISE = 0.01             # variance of a sample of visibility
 _LEAST_SHARE = 1 / 16          # of W that is noise
-_GLOSSY_SAMPLES = 96.0         # W / Q of glossy light, whose Q is not known
+_GLOSSY_SAMPLES = 48.0         # W / Q of glossy light, whose Q is not known
 _AT_REST, _IN_MOTION = 4.0, 0.5  # times k, of visibility
 _COLOR = 0.25                  # share of squared red and blue, of diffuse light
 _BLUE = 0.25

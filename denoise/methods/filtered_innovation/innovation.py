@@ -109,6 +109,7 @@ from .texture import AtRest, FromHistory, choose, found_at_rest, missed
 _TIE = 1e-6                    # excess of a history that is no better nor worse
 _NO_HISTORY = -3e14            # 1/z of a pixel without history
 _NEW = 1.5                     # n below which there is none
+NARROW_LOBE = 0.2              # roughness below which lobes meet lamps by rare chance
 
 
 class ShadowInnovation(NamedTuple):
@@ -239,6 +240,13 @@ def seen_twice(signals: list[Signal], innovations: list[Signal], length: Float) 
     """
     return [dr.select(length < _NEW, 0, dr.minimum(d.luminance, d.luminance - e.luminance))
             for d, e in zip(signals, innovations, strict=True)]
+
+
+def seen_twice_by_narrow_lobes(signals: list[Signal], innovations: list[Signal], length: Float,
+                               roughness: Float) -> list[Float]:
+    """`seen_twice`; of lobes that are not narrow more than can be."""
+    return [dr.select(roughness < NARROW_LOBE, both, MAX_ENERGY)
+            for both in seen_twice(signals, innovations, length)]
 
 
 def renewed(before: list[Signal], after: list[Signal], innovations: list[Signal],

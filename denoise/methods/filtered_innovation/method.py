@@ -327,7 +327,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             at_rest_between(previous, frame, stencil) if layout.has_texture else None,
             Vector3(*(stencil.opaque(ratio) for ratio in given.change.ratio)))
         innovations = passes.choose_histories(innovations, plane)
-        signals, innovations = passes.without_peaks_of_frame(signals, innovations, plane)
+        signals, innovations = passes.without_peaks_of_frame(signals, innovations, given.roughness,
+                                                             plane)
         smoothed = passes.smooth_innovations(innovations, plane)
         merged = passes.merge(signals, innovations, chosen, smoothed, plane,
                               self._gains(given, stencil, moving_lights,

@@ -35,7 +35,7 @@ from .innovation import (
     find_innovations,
     pack_history,
     renewed,
-    seen_twice,
+    seen_twice_by_narrow_lobes,
     to_smooth,
 )
 from .layout import NoisySignal, PlaneRule, SignalLayout, Smoothed
@@ -198,7 +198,7 @@ class Passes:
                             energies),
             PeakPasses.make(BEFORE_FILTER, layout.with_peaks, layout, buffer, surfaces, energies),
             Step(with_their_light),
-            Step(seen_twice), Step(renewed),
+            Step(seen_twice_by_narrow_lobes), Step(renewed),
             Step(residual),
             [Level.make(i, buffer, len(RESIDUAL_RULES), surfaces, _VALID_INVERSE_DEPTH,
                         lambda *a: smooth_level(RESIDUAL_RULES, *a))
@@ -251,17 +251,19 @@ class Passes:
         return self.choose(innovations, self._through(self.choice, excess, plane))
 
     def without_peaks_of_frame(self, signals: list[Signal], innovations: Innovations,
-                               plane: TangentPlane) -> tuple[list[Signal], Innovations]:
+                               roughness: Float | None, plane: TangentPlane,
+                               ) -> tuple[list[Signal], Innovations]:
         """Signals of the frame whose peaks have given their light to all around, and innovations
         of these."""
         which = self.peaks_of_frame.signals
-        if not which:
+        if not which or roughness is None:
             return signals, innovations
         before, changes = ([of_all[s] for s in which]
                            for of_all in (signals, innovations.signals))
         length = innovations.lengths[0]
         trimmed, energies = self._trimmed(self.peaks_of_frame, signals,
-                                          self.twice(before, changes, length), plane)
+                                          self.twice(before, changes, length, roughness),
+                                          plane)
         whole = self.make_whole([trimmed[s] for s in which], energies)
         news = self.renew(before, whole, changes, length)
         signals, changes = list(signals), list(innovations.signals)
