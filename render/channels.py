@@ -129,8 +129,8 @@ _ROWS = (
     Channel("hit_distance", Group.PATH, ("hit.Z",), FLOAT, Display.RANGE, 0.0,
             "from the first hit to what the path met next, scene units; 0: nothing"),
     Channel("unshadowed", Group.SPLIT, _rgb("unshadowed"), FLOAT, Display.LIGHT, 0.0,
-            "direct light as if nothing cast a shadow, noise-free (`--direct resampled` only); of a "
-            "sky none where all lobes are narrow"),
+            "direct light as if nothing cast a shadow, noise-free (`--direct resampled` only); "
+            "of a sky none where all lobes are narrow"),
     Channel("visibility", Group.SPLIT, ("visibility",), FLOAT, Display.UNIT, 0.0,
             "share of `unshadowed` that arrives, one noisy sample, may exceed 1, at most 10000 "
             "(likewise)"),
