@@ -212,10 +212,9 @@ FRAME = channels_of(Group.RADIANCE, Group.GUIDES, Group.PATH)
 """What can be said of every scene."""
 OFFERED = channels_of(*(group for group in Group if group not in (Group.TRUTH, Group.MOTION)))
 """What a rendered frame can carry."""
-TRAINING = tuple(name for name in OFFERED if name not in (
-    "color", "position", "hit_id", *REPLAY))
-"""What training and methods read, but for what `asvgf` and `trmv` alone do, without what follows
-from it (`render/derived.py`)."""
+TRAINING = tuple(name for name in OFFERED if name not in ("color", "position", *REPLAY))
+"""What training and methods read, but for what `asvgf` alone does, without what follows from it
+(`render/derived.py`)."""
 REFERENCE = ("color", "half", "quarter0", "quarter1")
 """What the file of a reference has."""
 

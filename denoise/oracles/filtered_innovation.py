@@ -119,6 +119,45 @@ def turn_of(previous: Frame, frame: Frame) -> np.ndarray:
     return np.minimum(np.linalg.norm(d, axis=-1) / width, 1)
 
 
+def image_motion(previous: Frame, frame: Frame) -> np.ndarray:
+    """How far what a mirror direction shows has moved by itself, in lobes; in world space."""
+    motion = np.zeros(frame["id"].shape)
+    if "hit_id" not in frame:
+        return motion
+    eye, alpha = np.linalg.inv(frame.camera_from_world)[:3, 3], roughness_of(frame)
+    met = (frame["hit_id"] >= 0) & (frame["hit_distance"] > 0) & (alpha < 1)
+    for y, x in np.argwhere(met):
+        p, n = (frame[name][y, x].astype(float) for name in ("position", "normal"))
+        v = (p - eye) / np.linalg.norm(p - eye)
+        d, i = frame["hit_distance"][y, x], int(frame["hit_id"][y, x])
+        hit = p + d * (v - 2 * (v @ n) * n)
+        back = previous.world_from_object[i] @ np.linalg.inv(frame.world_from_object[i])
+        was = (back @ [*hit, 1])[:3]
+        motion[y, x] = min(np.linalg.norm(hit - was) / d / (2 * alpha[y, x] + 0.005), 1)
+    return motion
+
+
+def what_was_there(previous: Frame, frame: Frame, image: np.ndarray) -> np.ndarray:
+    """(h, w) image of the frame before, at the pixel in which each surface was; 0 elsewhere."""
+    column, row = (np.floor(at) for at in places_before(previous, frame))
+    height, width = frame["id"].shape
+    inside = ((column >= 0) & (column < width) & (row >= 0) & (row < height)
+              & (frame["id"] >= 0))
+    row, column = (np.where(inside, at, 0).astype(int) for at in (row, column))
+    return np.where(inside, image[row, column], 0)
+
+
+def places_before(previous: Frame, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+    """Where on the screen each surface was, (column, row) in pixels."""
+    ids = np.maximum(frame["id"], 0)
+    back = np.array([before @ np.linalg.inv(now) for before, now in zip(
+        previous.world_from_object, frame.world_from_object)])[ids]
+    x = np.concatenate([frame["position"].astype(float), np.ones((*ids.shape, 1))], -1)
+    was = np.einsum("ij,hwjk,hwk->hwi", previous.screen_from_world, back, x)
+    depth = np.where(was[..., 3] > 0, was[..., 3], 1)
+    return was[..., 0] / depth, was[..., 1] / depth
+
+
 def color_of(frame: Frame, signals: dict[str, np.ndarray]) -> np.ndarray:
     direct = sum(signals[name] * u for name, u in unshadowed_of(frame).items())
     return (frame["emission"] + direct + texture_of(frame) * signals["L"]
@@ -389,14 +428,10 @@ def any_shift(previous: Frame, frame: Frame, told: np.ndarray | None = None) -> 
 
 def unrest(previous: Frame, frame: Frame, told: np.ndarray, m) -> np.ndarray:
     """How far shadows or surfaces move on the screen, from 0 where they stand still to 1."""
-    ids = np.maximum(frame["id"], 0)
-    back = np.array([before @ np.linalg.inv(now) for before, now in zip(
-        previous.world_from_object, frame.world_from_object)])[ids]
-    x = np.concatenate([frame["position"].astype(float), np.ones((*ids.shape, 1))], -1)
-    was = np.einsum("ij,hwjk,hwk->hwi", previous.screen_from_world, back, x)
-    column, row = np.meshgrid(np.arange(ids.shape[1]) + 0.5, np.arange(ids.shape[0]) + 0.5)
-    shift = sum(np.abs(was[..., i] / np.where(was[..., 3] > 0, was[..., 3], 1) - at)
-                for i, at in enumerate((column, row)))
+    height, width = frame["id"].shape
+    column, row = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    shift = sum(np.abs(was - at) for was, at in zip(
+        places_before(previous, frame), (column, row), strict=True))
     stopped, _ = sharpness(frame, told)
     rests = np.abs(any_shift(previous, frame, told)).sum(-1) <= 0.05
     around = spread_out(frame, 1.0 * np.stack([rests, stopped], -1), m)
@@ -650,6 +685,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
     lengths: dict[str, np.ndarray] = {}  # by what has one, see `length_of`
     previous, out = None, {}
     own = m
+    image_before = np.zeros(frames[0]["id"].shape)
     for frame, signals, lights in zip(frames, given, changes, strict=True):
         m, share = own, 0.0
         if previous is not None and m.follow_shadows and "light" in frame and len(given[0]) > 1:
@@ -725,11 +761,17 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
                 h = np.where((better & moves)[..., None], there, h)
                 energy = np.maximum(energy + np.minimum(excess[..., 0], 0), 0)
             turn, change = np.zeros(found.shape), wide
+            image = np.zeros(found.shape)
             moving = np.ones(found.shape) if follows else None
             if follows and previous is not None:
                 moving = unrest(previous, frame, told, m)
             if name == "G" and "roughness" in frame and previous is not None:
                 turn = np.where(found, turn_of(previous, frame), 0)
+                if "L" in signals and "light" in frame and m.follow_shadows:
+                    left_ = what_was_there(previous, frame, image_before)
+                    image_before = spread_out(frame, image_motion(previous, frame)[..., None],
+                                              m)[..., 0]
+                    image = np.minimum(4 * np.maximum(image_before, left_), 1)
             if sparse:
                 norm = norm_of(frame, here, found, smoothing, m, narrow)[..., None]
                 change = np.clip(h + norm * wide, -0.5, 2) - h
@@ -741,19 +783,20 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
                 key = length_of(frame, name)
                 ns[key] = np.maximum(np.minimum(ns[key], np.where(found, left, 1)), 1)
             parts[name] = (e, h, wide, q, energy, s2, samples, omega, here, lone, change, left,
-                           spatial, narrow, turn, moving)
+                           spatial, narrow, turn, moving, image)
         for name, d in signals.items():
             (e, h, wide, q, energy, s2, samples, omega, here, lone, change, left, spatial,
-             narrow, turn, moving) = parts[name]
+             narrow, turn, moving, image) = parts[name]
             alpha, _, levels, sigma, _ = settings.get(name, visible)
             sparse = name.isdigit()
             levels = max(levels - 1, 1) if sparse else levels
             n = np.ones(0) if sparse else ns[length_of(frame, name)]
             known = np.minimum(samples, left)
             a = (np.maximum(1 / (known + omega + 0.5 * np.minimum(left, 1)), alpha) if sparse
-                 else np.maximum(np.maximum(1 / n, alpha), turn))
+                 else np.maximum(np.maximum(1 / n, alpha), np.maximum(turn, image / 2)))
             follow = np.maximum(m.glossy_gain * (2 + np.minimum(30 * turn, 1)) / 3
                                 if "roughness" in frame else m.glossy_gain, alpha)
+            follow = follow + image * (1 - follow)
             if name != "G":
                 k = light_threshold if name == "L" else m.noise_threshold
                 certain = 1 - k * q / np.maximum(lum(wide) ** 2, 1e-20)

@@ -28,7 +28,7 @@ def folders(tmp_path_factory):
 
 def test_what_follows_from_other_channels_is_as_if_it_had_been_stored(folders):
     whole, less = folders["all"], folders["training"]
-    assert not {"color", "position", "hit_id"} & set(less.manifest.channels)
+    assert not {"color", "position"} & set(less.manifest.channels)
     for i in whole.frames:
         a, b = whole.read_frame(i), less.read_frame(i)
         assert set(b.images) == {*less.manifest.channels, *DERIVED}
@@ -59,7 +59,7 @@ def test_half_precision_saves_half_of_the_bytes(folders):
 
 def test_training_has_what_methods_read_and_nothing_that_follows():
     read = {c for name in METHODS for c in channels_read(build(name), OFFERED)}
-    read -= {*REPLAY, "hit_id"}  # which `asvgf` and `trmv` alone read
+    read -= set(REPLAY)  # which `asvgf` alone reads
     assert {c for c in available(TRAINING) if c != "position"} == read
     assert not set(TRAINING) & set(DERIVED)
 

@@ -16,14 +16,16 @@ and a signal takes the share f of it:
     h <- h + f S[e] + a (e - S[e])
 
     diffuse light, whose changes are slow        f = max(c, g L / (L + Q)),  L = (b l(h + S[e]))^2
-    glossy light                                 f = g'',         a = max(1 / n, alpha, t)
+    glossy light                                 f = g'' + u (1 - g''),
+                                                 a = max(1 / n, alpha, t, u / 2)
     visibility, whose changes have sharp edges   f = max(c, g'),  a = max(1 / n, alpha, r c)
 
 Light that changes by b of itself, seen with the variance Q, is followed best by L / (L + Q) of
 that (Wiener 1949): where few rays bring much of it, as by way of glass, S[e] is mostly noise. g''
-is two thirds of that where mirror directions stand still; g' two fifths where neither the shadow,
-by `shadow_motion.py`, nor the surface moves: near a contact S is narrow, and would bring its noise
-into a shadow that stands still. Where lights move, light changes everywhere: with m twice the
+is two thirds of that where mirror directions stand still; u is above 0 where what they show moves
+itself (t, and four times the mean of u, of `reflections.py`). g' is two fifths where neither the
+shadow, by `shadow_motion.py`, nor the surface moves: near a contact S is narrow, and would bring
+its noise into a shadow that stands still. Where lights move, light changes everywhere: with m twice the
 share of shadow rays that went to such, at most 1, g becomes g + m (1 - g), b / (1 - m) and
 k (1 - m / 2), and g' grows to 9/10. Where nothing moves, but the camera, and lights are known to be
 as they were (`inputs/light_change.py`), g is half of that. Where lights are known to have changed,
@@ -84,7 +86,7 @@ import drjit as dr
 from onespp.denoise.filters.contact import Contact
 from onespp.denoise.filters.penumbra import footprint_falloffs
 from onespp.denoise.history.records import look_up, pack_records, record_words
-from onespp.denoise.history.reflections import Lobes, turned
+from onespp.denoise.history.reflections import Lobes, image_turned, turned
 from onespp.denoise.history.reprojection import Motion, Place, ReprojectionTests, locate
 from onespp.denoise.history.shadow_motion import (
     MIN_MOTION,
@@ -141,6 +143,8 @@ class Innovations(NamedTuple):
         shadows: of the other history of each visibility that has one. footprint_falloffs: of
             `penumbra.py`, of each of those. sparse: of each sparse signal. turned: t of
             `reflections.py`, None where the lobes of glossy light are not known.
+        image_turned: how much of what lobes reflect has moved itself, of that module; None without
+            shadow rays, too.
         unrest: how much each visibility that shadow rays tell of may have changed by motion, 0
             where its shadow and its surface stand still on the screen, to 1.
         rests: 1 where the surface is at rest in the world, else 0.
@@ -158,6 +162,7 @@ class Innovations(NamedTuple):
     footprint_falloffs: list[Float]
     sparse: list[SparseHistory]
     turned: Float | None
+    image_turned: Float | None
     unrest: list[Float]
     rests: Float
     misses: Float | None = None
@@ -168,7 +173,7 @@ class Innovations(NamedTuple):
 
 def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signal],
                      chosen: Chosen | None, surface: SurfaceSample, plane: TangentPlane,
-                     motion: Motion, records: Float, around: Surroundings,
+                     motion: Motion, records: Float, around: Surroundings, image: Float | None,
                      tests: ReprojectionTests, max_history_length: Float,
                      falloff_scale: Float, lobes: Lobes | None,
                      rest: Motion | None, ratio: Vector3) -> Innovations:
@@ -176,7 +181,8 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
 
     Args:
         motion: of `motion_between`. records: of `pack_history`.
-        around: of `look_around`, smoothed. falloff_scale: of `penumbra.footprint_falloff`.
+        around: of `look_around`, smoothed. image: of that, of the previous frame.
+        falloff_scale: of `penumbra.footprint_falloff`.
         lobes: of `reflections.lobes_between`. rest: of `texture.at_rest_between`.
         ratio: of `inputs/light_change.py`, red, green and blue.
     """
@@ -231,6 +237,8 @@ def find_innovations(stencil: Stencil, layout: SignalLayout, signals: list[Signa
     return Innovations(e, energies, lengths, variances, valid_inverse_depth, others,
                        footprint_falloffs(penumbras, falloff_scale, MIN_SHARE), sparse,
                        None if lobes is None else turned(lobes, surface.normal, place),
+                       None if around.image is None or image is None
+                       else image_turned(stencil, around.image, image, place),
                        _unrest(stencil, shadows, place), place.rests, misses, at_rest, spatial,
                        mapped(lambda near: falloff_scale * near, around.contact))
 

@@ -32,6 +32,7 @@ from .texture import error_of_history, parts_of, renewal
 
 OF_STILL = 0.4                 # share of g' where shadows stand still
 OF_STILL_IMAGE = 2 / 3         # share of g'' where a mirror direction does
+OF_MOVING_IMAGE = 0.5          # weight of a frame where what is reflected moves
 MIN_NOISE = 0.25               # share of the innovation's energy that is at least noise of d
 _FILLED = 0.5                  # samples that what was filtered counts for
 _UNKNOWN = 0.5                 # visibility that nothing is known of
@@ -134,6 +135,9 @@ def merge(stencil: Stencil, layout: SignalLayout, signals: list[Signal], innovat
             alpha = dr.maximum(alpha, turned)
             moves = dr.minimum(turned * (1 / _MOVING_IMAGE), 1)
             gain = gain * dr.fma(1 - OF_STILL_IMAGE, moves, OF_STILL_IMAGE)
+            if innovations.image_turned is not None:
+                gain = dr.fma(innovations.image_turned, 1 - gain, gain)
+                alpha = dr.maximum(alpha, OF_MOVING_IMAGE * innovations.image_turned)
         if omega is None:
             a = dr.maximum(1 / lengths[layout.length(s)], alpha)
             energy = smoothed.energies[s]

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, NamedTuple
 
 import drjit as dr
@@ -38,6 +38,7 @@ from onespp.denoise.inputs.light_change import (
     change_of_lights,
     sample_light,
 )
+from onespp.denoise.inputs.path_hits import Hits, read_hits
 from onespp.denoise.inputs.shadow_rays import (
     ShadowRays,
     has_shadow_rays,
@@ -87,10 +88,11 @@ _BACKGROUND_SCALE = 1e3   # of 1/z of background and lamps: only their like coun
 @dataclass(frozen=True)
 class InnovationState(RecordState[Passes]):
     """`RecordState`, that of glossy light where it is of other layers, and what the frame told of
-    its lights."""
+    its lights; image: of `Surroundings`, smoothed."""
 
     layered: InnovationState | None = None
     lights: LightSample | None = None
+    image: Float | None = field(default=None, repr=False)
 
 
 class _Given(NamedTuple):
@@ -109,7 +111,7 @@ class _Given(NamedTuple):
     alone: Bool | None
     lit: Float | None
     rays: ShadowRays | None
-    hit_distance: Float
+    hits: Hits | None
     roughness: Float | None
     lobe: Float | None
     change: LightChange
@@ -136,7 +138,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         sharp_min_gain: as `min_gain`, of visibility; less where shadows stand still, up to 0.9
             where lights move, see `innovation.py` [1, 1e-6 to 1].
         glossy_gain: share of the smoothed innovation that the history of glossy light takes;
-            less where mirror directions stand still [1, 1e-6 to 1].
+            less where mirror directions stand still, up to all where what they show moves
+            [1, 1e-6 to 1].
         change_alpha: weight of the current frame in the high frequencies of visibility where a
             change of the low ones is certain [1, 0 to 1].
         light_change: how soon a change forgets the history of diffuse light: the squared change
@@ -212,7 +215,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
     penumbra: float = 0.6
     follow_shadows: bool = True
 
-    uses: ClassVar[tuple[str, ...]] = (*USED, *SHADOW, "hit_distance")
+    uses: ClassVar[tuple[str, ...]] = (*USED, *SHADOW, "hit_distance", "hit_id")
     renamed: ClassVar[Mapping[str, str]] = INNOVATION_RENAMED
 
     def __post_init__(self) -> None:
@@ -244,12 +247,10 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         stencil, previous = state.stencil, state.previous or frame
         of_gloss = surface_of_gloss(frame) if self.gloss else None
         light = read_signals(frame, color, stencil, self.demodulate, self.gloss, of_gloss)
-        rays = None
+        rays, hits = None, None
         if self.follow_shadows and light.unshadowed and has_shadow_rays(frame):
             rays = read_shadow_rays(frame, previous, stencil)
-        hit_distance = stencil.opaque(0)  # where a frame does not say
-        if rays is not None and "hit_distance" in frame:
-            (hit_distance,) = stencil.load(np.asarray(frame["hit_distance"], np.float32))
+            hits = read_hits(frame, previous, stencil)
         change, lights = LightChange(), None
         if light.unshadowed:
             change = change_of_lights(state.lights, previous, frame)
@@ -273,17 +274,17 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         if of_gloss is None or SignalKind.GLOSSY not in layout.kinds:
             output, own, after = self._filtered(_Given(
                 frame, layout, light.listed, light.chosen, surface, alone, light.lit, rays,
-                hit_distance, light.roughness, light.lobe, change), state)
+                hits, light.roughness, light.lobe, change), state)
             return finished(output, own, after), replace(after, layered=None, lights=lights)
         signals, glossy = list(light.listed), layout.kinds.index(SignalKind.GLOSSY)
         rest, only_gloss = layout.without_gloss()
         (gloss,), _, layered = self._filtered(_Given(
             of_gloss, only_gloss, [signals.pop(glossy)], None, read_surface(of_gloss, stencil),
-            read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, None, hit_distance,
+            read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, None, hits,
             light.roughness, light.lobe, change),
             state.layered or InnovationState(stencil, no_history(stencil)))
         output, own, after = self._filtered(_Given(
-            frame, rest, signals, light.chosen, surface, alone, light.lit, rays, hit_distance,
+            frame, rest, signals, light.chosen, surface, alone, light.lit, rays, hits,
             None, None, change), state)
         output.insert(glossy, gloss)
         return finished(output, own, after), replace(after, layered=layered, lights=lights)
@@ -311,18 +312,20 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         roughness = None
         if SignalKind.GLOSSY in layout.kinds:
             roughness = stencil.opaque(1) if given.roughness is None else given.roughness
-        hit_distance = given.hit_distance
         evaluate(signals, given.lit, sample, plane, id_,
-                 (rays, hit_distance, surface.position, roughness) if rays else None, chosen, lobes,
+                 (rays, given.hits, surface.position, roughness) if rays else None, chosen, lobes,
                  narrower)
 
         plane = passes.store_surface(id_, plane)
         if given.lit is not None:
             signals = passes.with_visibility_of_unlit(signals, given.lit, plane)
-        own, around = passes.surroundings(rays, hit_distance, sample, surface.position, plane,
+        own, around = passes.surroundings(rays, given.hits, sample, surface.position, plane,
                                           chosen, roughness)
+        before = state.image
+        if before is None and around.image is not None:
+            before = stencil.constant(0)
         innovations = passes.find_innovations(
-            signals, chosen, sample, plane, motion, records, around,
+            signals, chosen, sample, plane, motion, records, around, before,
             *self._reprojection_parameters(stencil), lobes,
             at_rest_between(previous, frame, stencil) if layout.has_texture else None,
             Vector3(*(stencil.opaque(ratio) for ratio in given.change.ratio)))
@@ -337,7 +340,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
                                       narrower)
         records = passes.pack(sample, History(merged.lengths, merged.signals),
                               output if layout.groups else None)
-        return output, own, replace(state, passes=passes, records=records,
+        return output, own, replace(state, passes=passes, records=records, image=around.image,
                                     previous=without_images(frame))
 
     def _layout(self, light: Signals, has_shadow_rays: bool, stencil: Stencil) -> SignalLayout:

@@ -20,6 +20,7 @@ from onespp.denoise.filters.peaks import (
 )
 from onespp.denoise.filters.tangent_plane import RING, Roughness, SurfaceTap, loosened, roughness
 from onespp.denoise.history.shadow_motion import SPREAD_LEVEL
+from onespp.denoise.inputs.path_hits import Hits
 from onespp.denoise.inputs.shadow_rays import ShadowRays
 from onespp.denoise.inputs.signals import Chosen, Signal, SignalKind
 from onespp.denoise.inputs.surface import SurfaceSample, TangentPlane
@@ -47,7 +48,7 @@ from .texture import CHOICE_RULES, RESIDUAL_RULES, Residual, residual, restored
 
 _OUTSIDE = -1e15          # 1/z outside the image
 _ID, _INVERSE_DEPTH, _VALID_INVERSE_DEPTH, _ROUGH = range(4)  # planes of the surface
-_SHADOW_PLANES, _CONTACT_PLANES = 6, 2  # of `Shadows` and `Contact`, but lobes
+_SHADOW_PLANES, _CONTACT_PLANES, _LOBE_PLANES = 6, 2, 2  # of what is seen around
 _AROUND, _WINDOW = [*window(1), (0, 0)], [*window(RADIUS), (0, 0)]
 T = TypeVar("T")
 
@@ -146,9 +147,9 @@ class Passes:
     @staticmethod
     def make(stencil: Stencil, layout: SignalLayout) -> Passes:
         surfaces = stencil.planes([-1.0, _OUTSIDE, _OUTSIDE, 0.0])
-        spread = [PlaneRule(SPREAD_LEVEL)] * (_SHADOW_PLANES * (layout.groups or 1)
-                                              + _CONTACT_PLANES * (not layout.has_layers)
-                                              + layout.kinds.count(SignalKind.GLOSSY))
+        spread = [PlaneRule(SPREAD_LEVEL)] * (
+            _SHADOW_PLANES * (layout.groups or 1) + _CONTACT_PLANES * (not layout.has_layers)
+            + _LOBE_PLANES * layout.kinds.count(SignalKind.GLOSSY))
         buffer = stencil.planes([0.0] * max(len(layout.smoothing_rules), len(spread),
                                             layout.output_planes(layout.output_level(0))))
 
@@ -183,8 +184,8 @@ class Passes:
             Step(roughness),
             Step(loosened),
             Level.make(0, buffer, 2, surfaces, _INVERSE_DEPTH, fill_level),
-            Step(lambda rays, hit_distance, chosen, *a: look_around(
-                stencil, rays, hit_distance, chosen, layout.groups, *a)),
+            Step(lambda rays, hits, chosen, *a: look_around(
+                stencil, rays, hits, chosen, layout.groups, *a)),
             Level.make(SPREAD_LEVEL, buffer, len(spread), surfaces, _INVERSE_DEPTH,
                        lambda *a: smooth_level(spread, *a)),
             Step(black_contact), Step(share_of_line), buffer.taps(_AROUND, [0]).named(single),
@@ -223,14 +224,14 @@ class Passes:
         filled, _ = self._through([self.fill], [visibility.luminance, lit], plane)
         return [*others, visibility._replace(luminance=filled)]
 
-    def surroundings(self, rays: ShadowRays | None, hit_distance: Float, surface: SurfaceSample,
+    def surroundings(self, rays: ShadowRays | None, hits: Hits | None, surface: SurfaceSample,
                      position: Vector3, plane: TangentPlane, chosen: Chosen | None,
                      roughness: Float | None) -> tuple[Surroundings, Surroundings]:
         """`look_around`, and means of it over a few pixels around; in scenes that have layers no
         filter asks for those of contacts."""
-        if rays is None:
+        if rays is None or hits is None:
             return Surroundings([], None), Surroundings([], None)
-        own = self.look_around(rays, hit_distance, chosen, surface, position, roughness)
+        own = self.look_around(rays, hits, chosen, surface, position, roughness)
         asked = own._replace(contact=None) if self.layout.has_layers else own
         return own, self._through([self.spread], asked, plane)
 

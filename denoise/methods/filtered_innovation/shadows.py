@@ -1,4 +1,5 @@
-"""What shadow rays say of each pixel: how its shadow moves, and how soft it is."""
+"""What each pixel's rays say: how its shadow moves, how soft that is, what is near, and whether
+what it reflects moves."""
 
 # pyright: standard
 from __future__ import annotations
@@ -9,7 +10,9 @@ import drjit as dr
 
 from onespp.denoise.filters.contact import Contact, contact_samples, dark_in_slits
 from onespp.denoise.filters.penumbra import PenumbraSample, left_in_hard_shadow, penumbra_samples
+from onespp.denoise.history.reflections import image_motion
 from onespp.denoise.history.shadow_motion import ShadowMotion, shadow_motion
+from onespp.denoise.inputs.path_hits import Hits
 from onespp.denoise.inputs.shadow_rays import ShadowRays, stopped
 from onespp.denoise.inputs.signals import Chosen, Signal, Signals
 from onespp.denoise.inputs.surface import SurfaceSample
@@ -28,10 +31,12 @@ class Shadows(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """What the rays of each pixel met, of each light, or means over the pixels around."""
+    """What the rays of each pixel met, of each light, or means over the pixels around; image: of
+    `reflections.image_motion`, None where nothing is glossy."""
 
     shadows: list[Shadows]
     contact: Contact | None
+    image: Float | None = None
 
 
 def follow_shadows(stencil: Stencil, rays: ShadowRays, surface: SurfaceSample,
@@ -51,16 +56,19 @@ def focal_length(rays: ShadowRays) -> Float:
     return dr.abs(rays.screen_from_camera.x.x)
 
 
-def look_around(stencil: Stencil, rays: ShadowRays, hit_distance: Float, chosen: Chosen | None,
+def look_around(stencil: Stencil, rays: ShadowRays, hits: Hits, chosen: Chosen | None,
                 groups: int, surface: SurfaceSample, position: Vector3,
                 roughness: Float | None) -> Surroundings:
     """What each pixel knows; arguments as of `of_each_light`, `shadow_motion`, `contact_samples`.
     """
     blocked, _ = stopped(rays, surface.id)
+    image = None
+    if roughness is not None:
+        image = image_motion(stencil, hits, roughness, surface.normal, position)
     return Surroundings(
         of_each_light(follow_shadows(stencil, rays, surface, position), chosen, groups),
-        contact_samples(blocked, rays.ray.blocker_distance, hit_distance,
-                        focal_length(rays) / surface.depth, roughness))
+        contact_samples(blocked, rays.ray.blocker_distance, hits.distance,
+                        focal_length(rays) / surface.depth, roughness), image)
 
 
 def of_each_light(shadows: Shadows, chosen: Chosen | None, groups: int) -> list[Shadows]:

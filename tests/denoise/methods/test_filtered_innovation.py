@@ -40,11 +40,12 @@ def with_shadow_rays(frame, seed=0, light=(1.0, -3.0, 1.0)):
     toward = np.where(there[..., None], points - frame["position"], 0)
     stopped = there & (rng.random(there.shape) < 0.4)
     distance = np.linalg.norm(toward, axis=-1) * rng.uniform(0.3, 0.6, there.shape)
+    hit = np.where(there, np.maximum(rng.uniform(-0.2, 0.2, there.shape), 0), 0)
     return with_images(frame, light=toward, light_id=lights,
                        blocker_distance=np.where(stopped, distance, 0),
                        blocker_id=np.where(stopped, 1, -1),
-                       hit_distance=np.where(there, np.maximum(rng.uniform(-0.2, 0.2, there.shape),
-                                                               0), 0))
+                       hit_distance=hit,
+                       hit_id=np.where(hit > 0, rng.choice([-1, 0, 1], there.shape), -1))
 
 
 def with_neighbour(frame):
