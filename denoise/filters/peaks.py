@@ -11,14 +11,16 @@ innovation.
     x' = min(x, max(t m, u min(d, h)))
 
     before the last filter    x = merged history,   output = F[x'] min(S[x] / S[x'], 6)
-        diffuse light t = 2.5 (its caustics are bright for a reason), glossy t = 1.5; u = 3/4
+        diffuse light t = 2.5 (its caustics are bright for a reason); u = 3/4
+        glossy light t = 1.5 + 10 b, b being how bent a surface is (`bent.bent_share`)
     before history            x = d,                d <- x' min(S[x] / S[x'], 6)
         glossy light of narrow lobes (roughness below 0.2) t = 4; u = 3
 
-What frame and history both have is no rare chance, as a highlight on a small bent thing. What is
-taken has its share in S of the light all around. Light is lost where the limit, 6, is reached:
-where S reaches only few pixels, as on leaves. Wider lobes meet lamps often, and what is taken from
-them before history is missed there; the light of other layers stays as it is, too.
+What frame and history both have is no rare chance; and where a surface is bent each pixel sees
+another part of what is around, as in the highlight on a small thing. What is taken has its share in
+S of the light all around. Light is lost where the limit, 6, is reached: where S reaches only few
+pixels, as on leaves. Wider lobes meet lamps often, and what is taken from them before history is
+missed there; the light of other layers stays as it is, too.
 
 Source: our own, of two known parts: outliers by their neighbours (as in GAMES202, lecture 13, here
 by the mean alone), and the ratio of two smoothings (Heitz et al. 2018), which gives light back.
@@ -38,6 +40,7 @@ from onespp.denoise.jit.taps import Taps
 
 RADIUS = 2                     # pixels
 MOST = 6.0                     # that light is multiplied by
+_OF_BENT = 10.0                # more of t where a surface is bent
 
 
 class Limits(NamedTuple):
@@ -59,13 +62,14 @@ class Energies(NamedTuple):
 
 
 def without_peaks(limits: Limits, kinds: Sequence[SignalKind], lights: list[Signal],
-                  seen_twice: list[Float], luminances: Taps[list[Float]],
+                  seen_twice: list[Float], bent: Float | None, luminances: Taps[list[Float]],
                   ids: Taps[Float]) -> tuple[list[Signal], Energies]:
     """Each light without its peaks, x', and its energies.
 
     Args:
-        kinds: of the lights. seen_twice: min(d, h) of each. luminances: x, at least 0. ids: of
-            objects. Both of the window of `RADIUS`, of which the last is the pixel.
+        kinds: of the lights. seen_twice: min(d, h) of each. bent: b, None for 0. luminances: x, at
+            least 0. ids: of objects. Both of the window of `RADIUS`, of which the last is the
+            pixel.
     """
     last = len(luminances) - 1
     center, id_ = luminances.at(last), ids.at(last)
@@ -77,7 +81,10 @@ def without_peaks(limits: Limits, kinds: Sequence[SignalKind], lights: list[Sign
         luminances.next()
     shares = []
     for kind, twice, x, total in zip(kinds, seen_twice, center, sums, strict=True):
-        least = dr.maximum(limits.around[kind] * total / dr.maximum(count, 1),
+        times = limits.around[kind]
+        if bent is not None and kind is SignalKind.GLOSSY:
+            times = dr.fma(bent, _OF_BENT, times)
+        least = dr.maximum(times * total / dr.maximum(count, 1),
                            limits.seen_twice * twice)
         is_peak = (x > least) & (least > 0)
         shares.append(dr.select(is_peak, least / dr.select(is_peak, x, 1), 1))

@@ -137,6 +137,25 @@ def image_motion(previous: Frame, frame: Frame) -> np.ndarray:
     return motion
 
 
+def bends_of(frame: Frame, length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(h, w, 2, 3) by how many lobes a mirror direction turns from pixel to pixel, along a row and
+    a column, such that a tap counts by exp(-|.|^2), and (h, w) how bent a surface is."""
+    n, ids, alpha = frame["normal"].astype(float), frame["id"], roughness_of(frame)
+    alpha = np.where(layers_of(frame), 1, alpha)
+    turn, (height, width) = np.zeros((*ids.shape, 2, 3)), ids.shape
+    for y, x in np.argwhere(alpha < 1):
+        for axis, (dy, dx) in enumerate(((0, 1), (1, 0))):
+            differences = [sign * (n[y + sign * dy, x + sign * dx] - n[y, x]) for sign in (-1, 1)
+                           if 0 <= y + sign * dy < height and 0 <= x + sign * dx < width
+                           and ids[y + sign * dy, x + sign * dx] == ids[y, x]]
+            if differences:
+                turn[y, x, axis] = 2 * np.mean(differences, 0)
+    turn /= (2 * alpha * (1 + (alpha / 0.15) ** 2) + 0.005)[..., None, None]
+    size = (turn ** 2).sum((-1, -2))
+    k = length / (length + 3) / (1 + 0.75 * size)
+    return turn * np.sqrt(2 * k)[..., None, None], 0.75 * size / (1 + 0.75 * size)
+
+
 def what_was_there(previous: Frame, frame: Frame, image: np.ndarray) -> np.ndarray:
     """(h, w) image of the frame before, at the pixel in which each surface was; 0 elsewhere."""
     column, row = (np.floor(at) for at in places_before(previous, frame))
@@ -289,20 +308,21 @@ def spread(frame: Frame, energy: np.ndarray, counts: np.ndarray, levels: int, m,
 
 def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, sigma: np.ndarray,
            fade: np.ndarray, narrow: np.ndarray, m, counts: np.ndarray | None = None,
-           theirs: float = 0.2, noisy: int = 0) -> np.ndarray:
+           theirs: float = 0.2, noisy: int = 0, bends: np.ndarray | None = None) -> np.ndarray:
     """The last filter; its last level's taps are weaker by `fade`, those of `noisy` levels more by
-    the noise that is left, all by exp(-narrow r^2), and a pixel weighs as much as it counts. It
-    compares the first three components, or the only one, by the pixel's variance and a share,
-    `theirs`, of what a neighbour has more."""
+    the noise that is left, all by exp(-narrow r^2) and by `bends_of`, and a pixel weighs as much as
+    it counts. It compares the first three components, or the only one, by the pixel's variance and
+    a share, `theirs`, of what a neighbour has more."""
     shape = frame["id"].shape
     counts = np.ones(shape) if counts is None else counts
+    bends = np.zeros((*shape, 2, 3)) if bends is None else bends
     for i in range(levels + noisy):
         weaker = fade if i == levels - 1 else np.ones_like(fade)
         if i >= levels:
             mean2 = np.maximum(lum(image[..., :3]) ** 2, 1e-12)
             weaker = np.clip(2.5 * variance / mean2, 1e-6, 1)
         pixels = pixels_of(frame, m, x=image, v=variance, fade=weaker, narrow=narrow, counts=counts,
-                           sigma=sigma)
+                           sigma=sigma, bends=bends)
         total, squares, weights = np.zeros_like(image), np.zeros(shape), np.zeros(shape)
         alike = np.zeros(shape)
         for dy in (-1, 0, 1):
@@ -316,6 +336,8 @@ def guided(frame: Frame, image: np.ndarray, variance: np.ndarray, levels: int, s
                     deviations = (lum(q.x[..., :3]) - lum(p.x[..., :3])) / np.sqrt(noise + 1e-12)
                     w = w * p.fade * np.exp(-(deviations / p.sigma) ** 2
                                             - p.narrow * (dy * dy + dx * dx) * 4**i)
+                    turned = dx * p.bends[..., 0, :] + dy * p.bends[..., 1, :]
+                    w = w * np.exp(-(turned ** 2).sum(-1) * 4**i)
                 alike[where] += w
                 w = w * q.counts
                 total[where] += w[..., None] * q.x
@@ -566,7 +588,7 @@ def contact(frame: Frame, m, name: str, length: np.ndarray) -> np.ndarray:
     return (near("blocker_distance", seen) + of_paths) * trust
 
 
-def without_peaks(frame: Frame, image: np.ndarray, least: np.ndarray, most: float, levels: int,
+def without_peaks(frame: Frame, image: np.ndarray, least: np.ndarray, most: Any, levels: int,
                   m) -> tuple:
     """Light without what is above `most` times the mean of the same object around and above
     `least`, and the factor that gives it back."""
@@ -833,17 +855,20 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
                     and m.follow_shadows and len(signals) > 1):
                 narrow = contact(frame, m, name, ns[length_of(frame, "L")])
             before, factor = history, np.ones(found.shape)
+            bends, bent = None, 0.0
+            if name == "G" and "roughness" in frame:
+                bends, bent = bends_of(frame, ns[length_of(frame, "L" if "L" in signals else "G")])
             if name in "LG" and has_peaks:
                 wide = m.innovation_levels if "L" in signals else m.sharp_innovation_levels
                 twice = np.where(found, np.minimum(lum(d), lum(d - e)), 0)
-                before, factor = without_peaks(frame, history, 0.75 * twice,
-                                               {"L": 2.5, "G": 1.5}[name], wide, m)
+                most = 2.5 if name == "L" else 1.5 + 10 * bent
+                before, factor = without_peaks(frame, history, 0.75 * twice, most, wide, m)
             fade = np.ones(found.shape) if name == "G" else fade
             out[name] = guided(frame, before, s2, levels, sigmas, fade, narrow, m,
                                np.clip(samples, 1e-5, 1) if sparse else None,
                                {"L": 0.2, "G": 1.0}.get(name, 0),
                                int(name == "L" and has_peaks and m.output_levels
-                                   < m.innovation_levels)) * factor[..., None]
+                                   < m.innovation_levels), bends) * factor[..., None]
             if sparse:
                 history = np.where(samples[..., None] > 1e-5, history, out[name])
             kept[name] = history, s2, np.minimum(samples, 64)

@@ -25,8 +25,8 @@ that (Wiener 1949): where few rays bring much of it, as by way of glass, S[e] is
 is two thirds of that where mirror directions stand still; u is above 0 where what they show moves
 itself (t, and four times the mean of u, of `reflections.py`). g' is two fifths where neither the
 shadow, by `shadow_motion.py`, nor the surface moves: near a contact S is narrow, and would bring
-its noise into a shadow that stands still. Where lights move, light changes everywhere: with m twice the
-share of shadow rays that went to such, at most 1, g becomes g + m (1 - g), b / (1 - m) and
+its noise into a shadow that stands still. Where lights move, light changes everywhere: with m twice
+the share of shadow rays that went to such, at most 1, g becomes g + m (1 - g), b / (1 - m) and
 k (1 - m / 2), and g' grows to 9/10. Where nothing moves, but the camera, and lights are known to be
 as they were (`inputs/light_change.py`), g is half of that. Where lights are known to have changed,
 all alike, h of diffuse and glossy light has changed with them before it is compared; by what else
@@ -65,7 +65,8 @@ the last level of other light fades out as the history grows. A pixel of another
 two fifths. In scenes with glossy surfaces light has no rare bright pixels before it, nor glossy
 light of the surface itself before it is compared with history: `peaks.py`.
 Visibility is filtered no farther than shadows are soft, and so are its e and Q: `penumbra.py`. The
-last filter of other light is narrower where other surfaces are close: `contact.py`.
+last filter of other light is narrower where other surfaces are close: `contact.py`, that of glossy
+light on bent surfaces: `bent.py`.
 Where neither history nor neighbours can know, a pixel's own rays decide: in slits and hard shadows
 (the same two), and at silhouettes whose normal faces away: `facing_away.py`.
 Normals are not compared: where they differ much the tangent plane is soon left, and at a crease, or

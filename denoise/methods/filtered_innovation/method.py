@@ -319,6 +319,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         plane = passes.store_surface(id_, plane)
         if given.lit is not None:
             signals = passes.with_visibility_of_unlit(signals, given.lit, plane)
+        bends = passes.bends(sample.normal, given.lobe)
         own, around = passes.surroundings(rays, given.hits, sample, surface.position, plane,
                                           chosen, roughness)
         before = state.image
@@ -337,7 +338,7 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
                               self._gains(given, stencil, moving_lights,
                                           bool(at_rest(previous, frame).all())))
         output = passes.filter_output(merged, innovations, plane, self._sigmas(stencil, layout),
-                                      narrower)
+                                      narrower, bends)
         records = passes.pack(sample, History(merged.lengths, merged.signals),
                               output if layout.groups else None)
         return output, own, replace(state, passes=passes, records=records, image=around.image,

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import drjit as dr
 
 from onespp.denoise.filters.atrous import EPSILON
+from onespp.denoise.filters.bent import Bend, along
 from onespp.denoise.filters.contact import ContactFalloff
 from onespp.denoise.filters.tangent_plane import BINOMIAL, SurfaceTap, surface_exponent
 from onespp.denoise.inputs.signals import SignalKind
@@ -33,13 +34,14 @@ class OutputFalloff(NamedTuple):
     """What weakens the taps of the last filter: `fade_out` of its last level, of each signal that
     is not sparse and of each that is, `penumbra.footprint_falloff` of each visibility that shadow
     rays tell of, `contact_falloff` where there are such rays, and by what sigma of glossy
-    light is divided, of `narrowed`."""
+    light is divided, of `narrowed`, and how it is bent, `bent.with_history`."""
 
     fades: list[Float]
     sparse_fades: list[Float]
     footprints: list[Float]
     contact: ContactFalloff | None
     narrowed: Float | None
+    bend: Bend | None
 
 
 def output_level(layout: SignalLayout, level: int, values: Taps[list[NoisySignal]],
@@ -125,7 +127,10 @@ class _Rule(NamedTuple):
             fade = noise_left(center)
         elif is_glossy or not layout.is_last_level(s, level):
             fade = None
-        return _Rule(footprint(near, spacing), fade, NEIGHBOURS_NOISE[layout.kinds[s]])
+        nearer = footprint(near, spacing)
+        if is_glossy and falloff.bend is not None:
+            nearer = along(falloff.bend, spacing, nearer)
+        return _Rule(nearer, fade, NEIGHBOURS_NOISE[layout.kinds[s]])
 
 
 def _start(center: NoisySignal, h0: float) -> NoisySignal:

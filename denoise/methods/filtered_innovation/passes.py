@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import drjit as dr
 
+from onespp.denoise.filters.bent import BESIDE, Bend, bend, bent_share, with_history
 from onespp.denoise.filters.contact import Contact, black_contact, share_of_line
 from onespp.denoise.filters.peaks import (
     BEFORE_FILTER,
@@ -111,6 +112,7 @@ class Passes:
         buffer: planes of what is being smoothed or filtered, see `layout.py`.
         peaks_of_frame, peaks_of_history: before history, and before the last filter.
         around: surfaces of the 3x3 pixels around. ring: of shares of roughness.
+        beside: normals, and object IDs, of the pixels beside.
         fill: of unlit pixels' visibility. line_taps: of `black_contact`.
     """
 
@@ -121,6 +123,8 @@ class Passes:
     around: Taps[SurfaceTap]
     ring: Taps[Float]
     roughness: Step[..., Roughness]
+    beside: tuple[Taps[Vector3], Taps[Float]]
+    bend: Step[..., Bend]
     loosen: Step[..., TangentPlane]
     fill: Level
     look_around: Step[..., Surroundings]
@@ -182,6 +186,9 @@ class Passes:
             surfaces.taps(_AROUND, [_INVERSE_DEPTH, _ID]).named(SurfaceTap),
             surfaces.taps(RING, [_ROUGH]).named(single),
             Step(roughness),
+            (buffer.taps(BESIDE, range(3)).named(Vector3),
+             surfaces.taps(BESIDE, [_ID]).named(single)),
+            Step(bend),
             Step(loosened),
             Level.make(0, buffer, 2, surfaces, _INVERSE_DEPTH, fill_level),
             Step(lambda rays, hits, chosen, *a: look_around(
@@ -214,6 +221,14 @@ class Passes:
         rough = self.roughness(self.around, plane)
         self.surfaces.store(rough.share, first=_ROUGH)
         return self.loosen(self.ring, rough, plane)
+
+    def bends(self, normal: Vector3, lobe: Float | None) -> Bend | None:
+        """How surfaces are bent, after `store_surface`; lobe: roughness, None where there is no
+        glossy light, or it is not known."""
+        if lobe is None:
+            return None
+        self.buffer.store(list(normal), gutters=True)
+        return self.bend(*self.beside, lobe)
 
     def with_visibility_of_unlit(self, signals: list[Signal], lit: Float,
                                  plane: TangentPlane) -> list[Signal]:
@@ -264,7 +279,7 @@ class Passes:
         length = innovations.lengths[0]
         trimmed, energies = self._trimmed(self.peaks_of_frame, signals,
                                           self.twice(before, changes, length, roughness),
-                                          plane)
+                                          None, plane)
         whole = self.make_whole([trimmed[s] for s in which], energies)
         news = self.renew(before, whole, changes, length)
         signals, changes = list(signals), list(innovations.signals)
@@ -279,15 +294,18 @@ class Passes:
                              innovations.footprint_falloffs)
 
     def filter_output(self, merged: Merged, innovations: Innovations, plane: TangentPlane,
-                      sigmas: list[Float], narrower: Float | None) -> list[Signal]:
-        """The last filter of each signal; narrower: of `narrowed`."""
+                      sigmas: list[Float], narrower: Float | None,
+                      bends: Bend | None) -> list[Signal]:
+        """The last filter of each signal; narrower: of `narrowed`. bends: of this class."""
         falloff = OutputFalloff(merged.fades, merged.sparse_fades, merged.footprints,
-                                merged.contact, narrower)
+                                merged.contact, narrower,
+                                bends and with_history(bends, merged.lengths[0]))
         before = [_counted(noisy) for noisy in merged.signals]
         if merged.parts is not None:
             before = [before[0]._replace(parts=merged.parts)]
         lights, energies = self._trimmed(self.peaks_of_history, [noisy.signal for noisy in before],
-                                         list(merged.seen_twice), plane)
+                                         list(merged.seen_twice), bends and bent_share(bends),
+                                         plane)
         before = [noisy._replace(signal=light) for noisy, light in zip(before, lights)]
         filtered = self._through(self.output, before, plane, falloff, sigmas)
         if merged.parts is None:
@@ -302,13 +320,14 @@ class Passes:
         return [self.restore(before[0], filtered[0], around, innovations.lengths[0])]
 
     def _trimmed(self, peaks: PeakPasses, signals: list[Signal], seen_twice: list[Float],
-                 plane: TangentPlane) -> tuple[list[Signal], Energies | None]:
+                 bent: Float | None, plane: TangentPlane,
+                 ) -> tuple[list[Signal], Energies | None]:
         """Signals without peaks, and the energies of those that may have some, smoothed."""
         if not peaks.signals:
             return signals, None
         lights = [signals[s] for s in peaks.signals]
         self.buffer.store([dr.maximum(light.luminance, 0) for light in lights], gutters=True)
-        lights, energies = peaks.trim(lights, seen_twice, *peaks.window)
+        lights, energies = peaks.trim(lights, seen_twice, bent, *peaks.window)
         trimmed = dict(zip(peaks.signals, lights, strict=True))
         return ([trimmed.get(s, signal) for s, signal in enumerate(signals)],
                 self._through(peaks.energies, energies, plane))

@@ -23,14 +23,15 @@ AROUND = [*window(2), (0, 0)]
 
 def trimmed(light: np.ndarray, ids: np.ndarray,
             kind: SignalKind = SignalKind.DIFFUSE, twice: float = 0,
-            limits: Limits = BEFORE_FILTER) -> tuple[np.ndarray, np.ndarray]:
+            limits: Limits = BEFORE_FILTER, bent: float = 0) -> tuple[np.ndarray, np.ndarray]:
     """(h, w) red of what is left of a light whose red is twice its luminance, and its share."""
     stencil = Stencil(*light.shape, 2)
     planes = stencil.planes([0.0, -1.0])
     (x,), (id_,) = stencil.load(light.astype(np.float32)), stencil.load(ids.astype(np.int32))
     planes.store([x, stencil.Float(id_)], gutters=True)
     (signal,), energies = without_peaks(
-        limits, [kind], [Signal(2 * x, x, x)], [stencil.opaque(twice)], planes.taps(AROUND, [0]),
+        limits, [kind], [Signal(2 * x, x, x)], [stencil.opaque(twice)],
+        stencil.opaque(bent) if bent else None, planes.taps(AROUND, [0]),
         planes.taps(AROUND, [1]).named(single))
     assert signal.red is not None
     red, before, after = (stencil.image(Color(v, v, v))[..., 0] for v in (
@@ -61,6 +62,15 @@ def test_a_peak_that_frame_and_history_have_keeps_a_share_of_the_lesser(limits: 
     light[3, 3] = 100
     _, left = trimmed(light, np.zeros((7, 7)), SignalKind.GLOSSY, 20, limits)
     np.testing.assert_allclose(left[3, 3], share * 20 / 100, rtol=1e-5)
+
+
+@pytest.mark.parametrize(("kind", "times"), [(SignalKind.DIFFUSE, 2.5), (SignalKind.GLOSSY, 6.5)])
+def test_on_a_bent_surface_glossy_light_may_be_brighter_than_around(kind: SignalKind,
+                                                                    times: float):
+    light = np.ones((7, 7))
+    light[3, 3] = 100
+    _, share = trimmed(light, np.zeros((7, 7)), kind, bent=0.5)
+    np.testing.assert_allclose(share[3, 3], times / 100, rtol=1e-5)
 
 
 def test_another_object_or_the_dark_around_makes_no_peak():
