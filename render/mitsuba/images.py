@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import drjit as dr
 import numpy as np
 
 from onespp.scenes.description import Disk, Mesh, Rectangle, Scene, Shape
@@ -29,6 +30,7 @@ from .variant import mi
 
 _CLEAR = ("SmoothConductor", "SmoothDielectric", "ThinDielectric", "Null")
 _AROUND = ("TwoSidedBRDF", "NormalMap", "BumpMap")
+_STRAIGHT_ON = ("Null", "MaskBSDF", "ThinDielectric")
 _THROUGH = +mi.BSDFFlags.DeltaTransmission | +mi.BSDFFlags.Null
 MOST = 16  # shapes whose images have matrices of their own, the largest ones,
 MOST_IMAGES = 2048  # of objects, in all of them
@@ -41,7 +43,8 @@ class Images:
 
     Attributes:
         rows: (registry indices) uint32, which row of images is in a shape, from 1; 0: none.
-        masks: (registry indices) uint32, 1 for shapes cut out by a mask.
+        masks: (registry indices) uint32, 1 for shapes cut out by a mask. clear: the same, for those
+            that let light straight through.
         in_several: the row of what is seen in one after another. layered: whether anything lets
             light through.
 
@@ -62,6 +65,8 @@ class Images:
         self._planes = [_plane(shape) for shape in self._mirrors]
         self.masks = np.zeros(max(shapes) + 1, np.uint32)
         self.masks[[i for i, shape in shapes.items() if _is_mask(shape)]] = 1
+        self.clear = np.zeros(max(shapes) + 1, np.uint32)
+        self.clear[[i for i, shape in shapes.items() if _lets_through(shape.bsdf())]] = 1
         self.layered = bool(self.masks.any()) or any(not only_mirrors(shapes[i]) for i in found)
         self.in_several = len(listed) + 1
         self.rows = np.zeros(max(shapes) + 1, np.uint32)
@@ -129,6 +134,21 @@ def is_clear(shape: mi.Shape) -> bool:
     Of what Mitsuba has, those whose lobes can be asked for one by one (not blends, nor masks).
     """
     return not shape.is_emitter() and _only(shape.bsdf(), _CLEAR)
+
+
+def shape_index(shape: mi.ShapePtr, active: mi.Bool) -> mi.UInt32:
+    """Index in the JIT registry, 0 where not `active`."""
+    return dr.select(active, dr.reinterpret_array(mi.UInt32, shape), 0)
+
+
+def _lets_through(bsdf: mi.BSDF) -> bool:
+    """Whether light goes straight on through a surface, by as much as the material tells when it is
+    asked (a normal map of a mask does not)."""
+    if not bsdf.flags() & +mi.BSDFFlags.Null:
+        return False
+    kind = bsdf.class_name()
+    return kind in _STRAIGHT_ON or (kind == "BlendBSDF" and all(
+        _lets_through(part) or not part.flags() & +mi.BSDFFlags.Null for part in nested(bsdf)))
 
 
 def _is_mask(shape: mi.Shape) -> bool:

@@ -189,6 +189,11 @@ class MitsubaScene:
         return aligned(mi.UInt32, self.images.masks) if self.images.masks.any() else None
 
     @cached_property
+    def clear(self) -> mi.UInt32 | None:
+        """Which shapes let light straight through, by registry index; None if none does."""
+        return aligned(mi.UInt32, self.images.clear) if self.images.clear.any() else None
+
+    @cached_property
     def appearance(self) -> Appearance:
         """What its materials say of themselves."""
         return Appearance({_registry_index(s): s.bsdf() for s in self.mi_scene.shapes()})

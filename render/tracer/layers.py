@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import drjit as dr
 
+from onespp.render.mitsuba.images import shape_index
 from onespp.render.mitsuba.variant import mi
 
-from .lights.resampling import shape_index
 from .way import Way, stepped
 
 _ONWARD = 0.5  # probability of a direction, above which it is the one that is followed

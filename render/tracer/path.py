@@ -20,11 +20,13 @@ from dataclasses import dataclass
 
 import drjit as dr
 
+from onespp.render.mitsuba.images import shape_index
 from onespp.render.mitsuba.variant import mi
 
 from .layers import is_straight
 from .lights.candidates import sought_light
-from .lights.resampling import DirectLight, Lights, resample_lights, shape_index
+from .lights.panes import goes_through
+from .lights.resampling import DirectLight, Lights, resample_lights
 from .lights.strata import power_heuristic
 from .replacement import Layer, Replaced
 from .sampler import Sampler, Sobol
@@ -64,7 +66,8 @@ class Radiance:
 def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sampler,
           max_depth: int, candidates: int = 1, lights: Lights | None = None,
           behind: Replaced | Layer | None = None, tell_straight: bool = False,
-          narrow: Callable[[mi.SurfaceInteraction3f], mi.Bool] | None = None) -> Radiance:
+          narrow: Callable[[mi.SurfaceInteraction3f], mi.Bool] | None = None,
+          clear: mi.UInt32 | None = None) -> Radiance:
     """One path a lane.
 
     Args:
@@ -74,7 +77,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         candidates: points of the lights that a vertex compares before it sends its shadow ray.
         lights: those that direct light at the first hit is resampled from; None: it is by MIS too.
         behind: what `ray` and `pi` are behind, if anything. tell_straight: see `Radiance.straight`.
-        narrow: whether a surface is so, as of `resample_lights`.
+        narrow: whether a surface is so, as of `resample_lights`. clear: of `MitsubaScene`.
     """
     context = mi.BSDFContext()
     o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
@@ -87,6 +90,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     arrived = None  # direct light, but for what purely specular lobes reflect
     beta, eta = mi.Color3f(1), mi.Float(1) if max_depth > SHORT else None
     depth, longest, opacity = mi.UInt32(0), max_depth, None
+    events = None if clear is None else mi.UInt32(0)  # of scattering, where they are not as many
     previous_p = mi.Point3f(0)
     bsdf_pdf = mi.Float(1)
     from_delta = mi.Bool(True)
@@ -104,23 +108,25 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         if dr.hint(behind is not None, mode="scalar"):
             smooth &= longest > 1
         split = resample_lights(scene, first, sampler, smooth, lights,
-                                None if narrow is None else narrow(first))
+                                None if narrow is None else narrow(first), clear,
+                                mi.UInt32(longest) - 2)
         if dr.hint(behind is not None, mode="scalar"):
             assert behind is not None
             split = split.through(behind.throughput)
         direct += split.direct
         arrived = mi.Color3f(split.direct)
 
-    while dr.hint(active, exclude=[scene, context, lights, longest, opacity, split, behind, narrow],
-                  max_iterations=max_depth, label="path"):
+    while dr.hint(active, exclude=[scene, context, lights, longest, opacity, split, behind, narrow,
+                                   clear], max_iterations=max_depth, label="path"):
         si = pi.compute_surface_interaction(mi.Ray3f(o, d))
         bsdf = si.bsdf()
+        order = depth if events is None else events
 
         # Light that the last direction ran into (for depth 0: what the camera sees itself).
         surer = 1.0
         if dr.hint(lights is not None, mode="scalar"):
             assert lights is not None
-            surer = dr.select((depth == 1) & si.is_valid(), lights.emitters, 1)
+            surer = dr.select((order == 1) & si.is_valid(), lights.emitters, 1)
         found = beta * _found_light(scene, si, previous_p, bsdf_pdf, from_delta, surer)
 
         # Light that this vertex looks for: one shadow ray.
@@ -128,8 +134,9 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         smooth = inner & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         if dr.hint(lights is not None, mode="scalar"):
             smooth &= depth > 0
-            arrived += dr.select((depth == 1) & ~from_delta, found, 0)
-        sought = beta * sought_light(scene, si, sampler, candidates, smooth)
+            arrived += dr.select((order == 1) & ~from_delta, found, 0)
+        sought = beta * sought_light(scene, si, sampler, candidates, smooth, clear,
+                                     longest - depth - 2)
         lobe = sampler.next_1d()
         if dr.hint(opacity is not None, mode="scalar"):  # of a mask's lobes, the surface's alone
             lobe *= dr.select(depth == 0, opacity, 1)
@@ -137,26 +144,33 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         if dr.hint(opacity is not None, mode="scalar"):  # (its density has the opacity in it)
             bsdf_weight *= dr.select(depth == 0, opacity, 1)
 
-        emission += dr.select(depth == 0, found, 0)
-        direct += dr.select(depth == 1, found, 0) + dr.select(depth == 0, sought, 0)
-        further = dr.select(depth >= 2, found, 0) + dr.select(depth >= 1, sought, 0)
+        emission += dr.select(order == 0, found, 0)
+        direct += dr.select(order == 1, found, 0) + dr.select(order == 0, sought, 0)
+        further = dr.select(order >= 2, found, 0) + dr.select(order >= 1, sought, 0)
         indirect += further
         specular += dr.select(through_gloss, further, 0)
 
         onward = si.spawn_ray(si.to_world(bsdf_sample.wo))
         o, d = onward.o, onward.d
         beta *= bsdf_weight
-        bsdf_pdf = mi.Float(bsdf_sample.pdf)
-        from_delta = mi.has_flag(bsdf_sample.sampled_type, mi.BSDFFlags.Delta)
-        through_gloss |= (depth == 0) & (from_delta | mi.has_flag(bsdf_sample.sampled_type,
-                                                                  mi.BSDFFlags.Glossy))
+        is_delta = mi.has_flag(bsdf_sample.sampled_type, mi.BSDFFlags.Delta)
+        through_gloss |= (depth == 0) & (is_delta | mi.has_flag(bsdf_sample.sampled_type,
+                                                                mi.BSDFFlags.Glossy))
         if dr.hint(tell_straight, mode="scalar"):
             assert straight is not None
             assert stays_straight is not None
             straight += dr.select(stays_straight, found, 0)
             stays_straight &= is_straight(bsdf_sample, 1.0 if opacity is None else
                                           dr.select(depth == 0, opacity, 1))
-        previous_p = mi.Point3f(si.p)
+        passes = mi.Bool(False)
+        if dr.hint(clear is not None, mode="scalar"):
+            assert clear is not None
+            assert events is not None
+            passes = goes_through(bsdf_sample, si.shape, clear, inner)
+            events += dr.select(passes, mi.UInt32(0), 1)
+        previous_p = dr.select(passes, previous_p, si.p)
+        bsdf_pdf = dr.select(passes, bsdf_pdf, bsdf_sample.pdf)
+        from_delta = dr.select(passes, from_delta, is_delta)
         active = inner & (dr.max(beta) > 0)
         depth += 1
         if dr.hint(max_depth > SHORT, mode="scalar"):
@@ -178,14 +192,14 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
 @dr.syntax
 def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sobol,
                    start: mi.UInt32, end: mi.UInt32, max_depth: int,
-                   candidates: int) -> mi.Color3f:
+                   candidates: int, clear: mi.UInt32 | None = None) -> mi.Color3f:
     """Sum of samples `start` to `end` - 1 of all lanes: the paths of `trace`, radiance alone.
 
     One loop over the vertices of all samples: a lane whose path has ended begins the next from the
     first hit, which is the same for all of them, and waits for no other lane's.
 
     Args:
-        scene, ray, pi, max_depth, candidates: as for `trace`.
+        scene, ray, pi, max_depth, candidates, clear: as for `trace`.
         sampler: with the lanes' scrambling, at any sample.
     """
     first = pi.compute_surface_interaction(ray)
@@ -198,7 +212,7 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
     alive = mi.Bool(False)  # on the way to a hit; at the beginning, all have to start
     running = first.is_valid() & (start < end) & (max_depth > 1)
 
-    while dr.hint(running, exclude=[sampler], label="samples"):
+    while dr.hint(running, exclude=[sampler, clear], label="samples"):
         met = pi.compute_surface_interaction(ray, active=alive)
         found = _found_light(scene, met, previous_p, bsdf_pdf, from_delta)
         total += dr.select(alive, beta * found, 0)
@@ -213,14 +227,20 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
 
         bsdf = si.bsdf()
         smooth = running & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        total += beta * sought_light(scene, si, numbers, candidates, smooth)
+        total += beta * sought_light(scene, si, numbers, candidates, smooth, clear,
+                                     max_depth - depth - 2)
         bsdf_sample, bsdf_weight = bsdf.sample(mi.BSDFContext(), si, numbers.next_1d(),
                                                numbers.next_2d(), running)
         ray = si.spawn_ray(si.to_world(bsdf_sample.wo))
         beta *= bsdf_weight
-        bsdf_pdf = mi.Float(bsdf_sample.pdf)
-        from_delta = mi.has_flag(bsdf_sample.sampled_type, mi.BSDFFlags.Delta)
-        previous_p = mi.Point3f(si.p)
+        passes = mi.Bool(False)
+        if dr.hint(clear is not None, mode="scalar"):
+            assert clear is not None
+            passes = goes_through(bsdf_sample, si.shape, clear, running)
+        bsdf_pdf = dr.select(passes, bsdf_pdf, bsdf_sample.pdf)
+        from_delta = dr.select(passes, from_delta,
+                               mi.has_flag(bsdf_sample.sampled_type, mi.BSDFFlags.Delta))
+        previous_p = dr.select(passes, previous_p, si.p)
         alive = running & (dr.max(beta) > 0)
         depth += 1
         if dr.hint(max_depth > SHORT, mode="scalar"):

@@ -127,7 +127,7 @@ class Renderer(View):
             if set(channels) & _TRACED:
                 radiance = trace(scene, seen, pi, sampler, self.scene.max_depth,
                                  self.candidates, self.lights_now, behind,
-                                 narrow=self._narrow)
+                                 narrow=self._narrow, clear=self.stage.clear)
                 if behind and behind.other:
                     radiance = self._with_layers(radiance, behind, sampler)
                 unit = dr.opaque(mi.Float, self.stage.unit)
@@ -182,7 +182,7 @@ class Renderer(View):
         pi = scene.ray_intersect_preliminary(layer.ray, coherent=False,
                                              active=dr.max(layer.throughput) > 0)
         other = trace(scene, layer.ray, pi, sampler, self.scene.max_depth, self.candidates,
-                      behind=layer, tell_straight=True)
+                      behind=layer, tell_straight=True, clear=self.stage.clear)
         assert other.straight is not None
         light = other.emission + other.direct + other.indirect - other.straight
         light = dr.maximum(light, 0)  # (rounding)
@@ -203,14 +203,15 @@ class Renderer(View):
         candidates = candidates_for(scene)
         if dr.hint(not antialias, mode="scalar"):
             return sum_of_samples(scene, centre_ray, centre_pi, Sobol(keys, pixel, sample), sample,
-                                  end, self.scene.max_depth, candidates)
+                                  end, self.scene.max_depth, candidates, self.stage.clear)
         color = mi.Color3f(0)
         while dr.hint(sample < end, exclude=[scene, rays]):
             sampler = Sobol(keys, pixel, sample)
             jitter = sampler.next_2d()
             ray, _ = rays.at(x + jitter.x - 0.5, y + jitter.y - 0.5)
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
-            radiance = trace(scene, ray, pi, sampler, self.scene.max_depth, candidates=candidates)
+            radiance = trace(scene, ray, pi, sampler, self.scene.max_depth, candidates=candidates,
+                             clear=self.stage.clear)
             color += radiance.emission + radiance.direct + radiance.indirect
             sample += 1
         return color

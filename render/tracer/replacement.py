@@ -24,11 +24,11 @@ from typing import Any
 
 import drjit as dr
 
+from onespp.render.mitsuba.images import shape_index
 from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 
 from .layers import Aside
-from .lights.resampling import shape_index
 from .lights.reservoir import offered
 from .sampler import Sampler
 from .way import Way, combined, stepped

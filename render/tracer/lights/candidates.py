@@ -20,11 +20,14 @@ Bitterli et al. 2020 (ReSTIR), of the candidates of one vertex alone.
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
 
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.sampler import Sampler
 
+from .panes import passage
 from .reservoir import offered
 from .strata import power_heuristic
 
@@ -40,12 +43,13 @@ def candidates_for(scene: mi.Scene) -> int:
 
 @dr.syntax
 def sought_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler, candidates: int,
-                 active: mi.Bool) -> mi.Color3f:
+                 active: mi.Bool, clear: Any = None, most: Any = None) -> mi.Color3f:
     """Radiance toward `si.wi` from light sampling, weighed against BSDF sampling; one shadow ray.
 
     Args:
         candidates: M, 1 or more (1: as Mitsuba's `path`, with the same random numbers).
         active: where there is a lobe that is not purely specular.
+        clear, most: as of `panes.passage`; clear is None where rays go through nothing.
     """
     context = mi.BSDFContext()
     bsdf = si.bsdf()
@@ -72,6 +76,9 @@ def sought_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
         place = dr.select(taken, light.p, place)
         i += 1
     lit = active & (total > 0)
-    shadowed = scene.ray_test(si.spawn_ray_to(place), lit)
     scale = total / (kept_luminance * candidates)
+    if dr.hint(clear is not None, mode="scalar"):
+        through = passage(scene, si, place, clear, most, lit).through
+        return dr.select(lit, through * kept * scale, 0)
+    shadowed = scene.ray_test(si.spawn_ray_to(place), lit)
     return dr.select(lit & ~shadowed, kept * scale, 0)

@@ -45,11 +45,13 @@ from typing import Any
 
 import drjit as dr
 
+from onespp.render.mitsuba.images import shape_index
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.sampler import Sampler
 
 from .clusters import Clusters, light_of_cluster
 from .middles import Middles, middles_of
+from .panes import passage
 from .reservoir import offered
 from .strata import light_point
 from .sun import SUN_BIT, Sun
@@ -161,12 +163,14 @@ class Pick:
 
 @dr.syntax
 def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
-                    active: mi.Bool, lights: Any, narrow: Any = None) -> DirectLight:
+                    active: mi.Bool, lights: Any, narrow: Any = None, clear: Any = None,
+                    most: Any = None) -> DirectLight:
     """Direct light toward `si.wi` from light sampling, one shadow ray a lane.
 
     Args:
         lights: `Lights`, of the scene. narrow: mask of surfaces that have no lobes but such as
             `NARROW` tells, None where there are none or there is no sky.
+        clear, most: as of `panes.passage`; clear is None where rays go through nothing.
     """
     strata = dr.width(lights.stratum)
     choice, jitter = sampler.next_1d(), sampler.next_2d()
@@ -182,10 +186,18 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     point = light_point(scene, si, stratum, jitter, active, lights.sun)
     c, light = more * point.c, point.light
     lit = active & (dr.max(c) > 0)
-    toward = si.spawn_ray_to(light.p)
-    blocker = scene.ray_intersect_preliminary(toward, coherent=False, active=lit)
-    shadowed = blocker.is_valid()
-    direct = dr.select(lit & ~shadowed, point.weight(lights.share(stratum)) * c / p, 0)
+    weight = point.weight(lights.share(stratum))
+    if dr.hint(clear is not None, mode="scalar"):
+        between = passage(scene, si, light.p, clear, most, lit)
+        shape, face, distance = between.shape, between.face, between.distance
+        direct = dr.select(lit, between.through * weight * c / p, 0)
+    else:
+        toward = si.spawn_ray_to(light.p)
+        blocker = scene.ray_intersect_preliminary(toward, coherent=False, active=lit)
+        shadowed = blocker.is_valid()
+        shape, face = shape_index(blocker.shape, lit & shadowed), blocker.prim_index
+        distance = dr.select(lit & shadowed, blocker.t, 0)
+        direct = dr.select(lit & ~shadowed, weight * c / p, 0)
     sample, to_sun = None, mi.Bool(False)
     if dr.hint(lights.sun is not None, mode="scalar"):
         to_sun = lit & ((stratum & SUN_BIT) != 0)
@@ -197,8 +209,7 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     return DirectLight(
         direct, pick.unshadowed,
         dr.select(lit, light.p - si.p, 0), shape_index(light.emitter.get_shape(), lit),
-        dr.select(lit & shadowed, blocker.t, 0), shape_index(blocker.shape, lit & shadowed),
-        blocker.prim_index, to_sun, sample)
+        distance, shape, face, to_sun, sample)
 
 
 def _picked(scene: mi.Scene, si: mi.SurfaceInteraction3f, choice: mi.Float, active: mi.Bool,
@@ -305,8 +316,3 @@ def group_sample(lights: Lights, unshadowed: list[mi.Color3f], group: mi.UInt32,
     scale = dr.select(told, chance / of_group, 0)
     return GroupSample(unshadowed, dr.select(told, mi.Int32(group), -1), scale * arrived,
                        scale * possible, dr.select(told, chance, 0))
-
-
-def shape_index(shape: mi.ShapePtr, active: mi.Bool) -> mi.UInt32:
-    """Index in the JIT registry, 0 where not `active`."""
-    return dr.select(active, dr.reinterpret_array(mi.UInt32, shape), 0)
