@@ -1,4 +1,4 @@
-"""Light straight through masks and panes: against Mitsuba's `path`, and what a frame tells of it."""
+"""Light straight through masks and panes: against Mitsuba's `path`, and what frames tell of it."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def test_visibility_is_the_share_that_gets_through(material, share):
     straight = plain["visibility"] > 0
     straight &= np.hypot(plain["position"][..., 0], plain["position"][..., 2]) < 0.8
     ratio = seen["visibility"][straight] / plain["visibility"][straight]
-    if share is None:  # r + r t^2 / (1 - r^2) of Fresnel's r, at an index of 1.5 and 0 to 10 degrees
+    if share is None:  # Fresnel's r twice over 1 + r, at an index of 1.5
         share = 1 - 2 * 0.04 / 1.04
     assert straight.sum() > 20
     np.testing.assert_allclose(np.median(ratio), share, rtol=5e-3)
