@@ -45,6 +45,7 @@ class Images:
         rows: (registry indices) uint32, which row of images is in a shape, from 1; 0: none.
         masks: (registry indices) uint32, 1 for shapes cut out by a mask. clear: the same, for those
             that let light straight through.
+        flat: registry indices of flat mirrors that nothing but their shape bends.
         in_several: the row of what is seen in one after another. layered: whether anything lets
             light through.
 
@@ -63,6 +64,9 @@ class Images:
         listed = sorted(by_size[:most], key=names.__getitem__)
         self._mirrors = [by_name[names[i]] for i in listed]
         self._planes = [_plane(shape) for shape in self._mirrors]
+        self._plain = [i for i, index in enumerate(listed)
+                       if self._planes[i] is not None and _is_plain(shapes[index].bsdf())]
+        self.flat = [listed[i] for i in self._plain]
         self.masks = np.zeros(max(shapes) + 1, np.uint32)
         self.masks[[i for i, shape in shapes.items() if _is_mask(shape)]] = 1
         self.clear = np.zeros(max(shapes) + 1, np.uint32)
@@ -108,6 +112,11 @@ class Images:
             moves += [False] * len(shapes)
         return tuple(name for name, is_so in zip(self.names(), moves, strict=True) if is_so)
 
+    def flat_planes(self, frame: float) -> np.ndarray:
+        """(n, 2, 3) a point and the unit normal of each of `flat`, world space."""
+        return np.array([_plane_at(self._mirrors[i].world_from_object_at(frame), *plane)
+                         for i in self._plain if (plane := self._planes[i])]).reshape(-1, 2, 3)
+
     def places(self, frame: float, world_from_object: np.ndarray) -> np.ndarray:
         """(n, 4, 4) of the objects -> those of objects and images, by ID, float64."""
         if not self._are_there:
@@ -151,6 +160,13 @@ def _lets_through(bsdf: mi.BSDF) -> bool:
         _lets_through(part) or not part.flags() & +mi.BSDFFlags.Null for part in nested(bsdf)))
 
 
+def _is_plain(bsdf: mi.BSDF) -> bool:
+    """Whether a surface mirrors in its own plane, without maps."""
+    kind = bsdf.class_name()
+    return kind == "SmoothConductor" or (kind == "TwoSidedBRDF" and all(map(_is_plain,
+                                                                            nested(bsdf))))
+
+
 def _is_mask(shape: mi.Shape) -> bool:
     return shape.bsdf().class_name() == "MaskBSDF" and not shape.is_emitter()
 
@@ -184,12 +200,18 @@ def _plane(shape: Shape) -> tuple[np.ndarray, np.ndarray] | None:
 
 def _reflection(world_from_object: np.ndarray, point: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """(4, 4) in the plane that a shape's matrix takes its plane to; of no plane, the identity."""
-    linear, moved = world_from_object[:3, :3], np.eye(4)
+    moved = np.eye(4)
+    point, n = _plane_at(world_from_object, point, normal)
+    moved[:3, :3] -= 2 * np.outer(n, n)
+    moved[:3, 3] = 2 * n * (n @ point)
+    return moved
+
+
+def _plane_at(world_from_object: np.ndarray, point: np.ndarray,
+              normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A point and the unit normal of the plane that a matrix takes a plane to; 0 for no plane."""
+    linear = world_from_object[:3, :3]
     a, b = np.linalg.svd(normal[None])[2][1:]  # along the plane
     n = np.cross(linear @ a, linear @ b)
     length = np.linalg.norm(n)
-    if length > 0:
-        n /= length
-        moved[:3, :3] -= 2 * np.outer(n, n)
-        moved[:3, 3] = 2 * n * (n @ (linear @ point + world_from_object[:3, 3]))
-    return moved
+    return linear @ point + world_from_object[:3, 3], n / length if length > 0 else 0 * n

@@ -193,6 +193,15 @@ class MitsubaScene:
         """Which shapes let light straight through, by registry index; None if none does."""
         return aligned(mi.UInt32, self.images.clear) if self.images.clear.any() else None
 
+    def flat_mirrors(self) -> tuple[np.ndarray, np.ndarray]:
+        """Registry indices (m,) uint32 of flat mirrors, and (m, 4) their planes (n, d), n . x = d
+        in the stage, at the current frame."""
+        found = self.images.flat_planes(self.frame)
+        point, normal = (found[:, 0] - self.origin) / self.unit, found[:, 1]
+        distance = (point * normal).sum(-1, keepdims=True)
+        return (np.array(self.images.flat, np.uint32),
+                np.concatenate([normal, distance], -1).astype(np.float32))
+
     @cached_property
     def appearance(self) -> Appearance:
         """What its materials say of themselves."""

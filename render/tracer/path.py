@@ -25,6 +25,7 @@ from onespp.render.mitsuba.variant import mi
 
 from .layers import is_straight
 from .lights.candidates import sought_light
+from .lights.mirrors import Mirrors, light_in_mirrors, one_of_several
 from .lights.panes import goes_through
 from .lights.resampling import DirectLight, Lights, resample_lights
 from .lights.strata import power_heuristic
@@ -67,7 +68,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
           max_depth: int, candidates: int = 1, lights: Lights | None = None,
           behind: Replaced | Layer | None = None, tell_straight: bool = False,
           narrow: Callable[[mi.SurfaceInteraction3f], mi.Bool] | None = None,
-          clear: mi.UInt32 | None = None) -> Radiance:
+          clear: mi.UInt32 | None = None, mirrors: Mirrors | None = None) -> Radiance:
     """One path a lane.
 
     Args:
@@ -78,6 +79,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         lights: those that direct light at the first hit is resampled from; None: it is by MIS too.
         behind: what `ray` and `pi` are behind, if anything. tell_straight: see `Radiance.straight`.
         narrow: whether a surface is so, as of `resample_lights`. clear: of `MitsubaScene`.
+        mirrors: of the scene as it stands, None where no light is looked for in any.
     """
     context = mi.BSDFContext()
     o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
@@ -101,6 +103,9 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         opacity = behind.opacity
         active = dr.max(behind.throughput) > 0  # a packet without layers takes no step
 
+    sought_there = None if mirrors is None else mi.Bool(False)  # in mirrors, by the last vertex
+    fewer = one_of_several(mirrors)  # times `surer`
+
     split = None
     if dr.hint(lights is not None, mode="scalar"):
         first = pi.compute_surface_interaction(ray)
@@ -117,7 +122,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         arrived = mi.Color3f(split.direct)
 
     while dr.hint(active, exclude=[scene, context, lights, longest, opacity, split, behind, narrow,
-                                   clear], max_iterations=max_depth, label="path"):
+                                   clear, mirrors], max_iterations=max_depth, label="path"):
         si = pi.compute_surface_interaction(mi.Ray3f(o, d))
         bsdf = si.bsdf()
         order = depth if events is None else events
@@ -127,6 +132,9 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         if dr.hint(lights is not None, mode="scalar"):
             assert lights is not None
             surer = dr.select((order == 1) & si.is_valid(), lights.emitters, 1)
+        if dr.hint(fewer is not None, mode="scalar"):
+            assert fewer is not None
+            surer = surer * fewer
         found = beta * _found_light(scene, si, previous_p, bsdf_pdf, from_delta, surer)
 
         # Light that this vertex looks for: one shadow ray.
@@ -137,6 +145,12 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
             arrived += dr.select((order == 1) & ~from_delta, found, 0)
         sought = beta * sought_light(scene, si, sampler, candidates, smooth, clear,
                                      longest - depth - 2)
+        mirrored, seeks = mi.Color3f(0), mi.Bool(False)
+        if dr.hint(mirrors is not None, mode="scalar"):
+            # (Not where some of it would be specular.)
+            seeks = inner & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth) & (depth + 2 < longest)
+            seeks &= (depth > 0) | ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Glossy)
+            mirrored = beta * light_in_mirrors(scene, si, sampler, mirrors, seeks)
         lobe = sampler.next_1d()
         if dr.hint(opacity is not None, mode="scalar"):  # of a mask's lobes, the surface's alone
             lobe *= dr.select(depth == 0, opacity, 1)
@@ -147,6 +161,8 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         emission += dr.select(order == 0, found, 0)
         direct += dr.select(order == 1, found, 0) + dr.select(order == 0, sought, 0)
         further = dr.select(order >= 2, found, 0) + dr.select(order >= 1, sought, 0)
+        if dr.hint(mirrors is not None, mode="scalar"):
+            further += mirrored
         indirect += further
         specular += dr.select(through_gloss, further, 0)
 
@@ -168,7 +184,16 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
             assert events is not None
             passes = goes_through(bsdf_sample, si.shape, clear, inner)
             events += dr.select(passes, mi.UInt32(0), 1)
-        previous_p = dr.select(passes, previous_p, si.p)
+        vertex = mi.Point3f(si.p)
+        if dr.hint(mirrors is not None, mode="scalar"):
+            assert mirrors is not None
+            row = mirrors.row(si.shape, inner)
+            passes = is_delta & sought_there & (row != 0)
+            vertex = dr.select(passes, mirrors.image(row - 1, previous_p, passes), vertex)
+            if dr.hint(fewer is not None, mode="scalar"):
+                fewer = dr.select(passes, mi.Float(1 / mirrors.count), 1)
+            sought_there = seeks & ~is_delta
+        previous_p = vertex if events is None else dr.select(passes, previous_p, vertex)
         bsdf_pdf = dr.select(passes, bsdf_pdf, bsdf_sample.pdf)
         from_delta = dr.select(passes, from_delta, is_delta)
         active = inner & (dr.max(beta) > 0)
@@ -192,14 +217,15 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
 @dr.syntax
 def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sobol,
                    start: mi.UInt32, end: mi.UInt32, max_depth: int,
-                   candidates: int, clear: mi.UInt32 | None = None) -> mi.Color3f:
+                   candidates: int, clear: mi.UInt32 | None = None,
+                   mirrors: Mirrors | None = None) -> mi.Color3f:
     """Sum of samples `start` to `end` - 1 of all lanes: the paths of `trace`, radiance alone.
 
     One loop over the vertices of all samples: a lane whose path has ended begins the next from the
     first hit, which is the same for all of them, and waits for no other lane's.
 
     Args:
-        scene, ray, pi, max_depth, candidates, clear: as for `trace`.
+        scene, ray, pi, max_depth, candidates, clear, mirrors: as for `trace`.
         sampler: with the lanes' scrambling, at any sample.
     """
     first = pi.compute_surface_interaction(ray)
@@ -209,12 +235,15 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
     beta, eta, depth = mi.Color3f(0), mi.Float(1), mi.UInt32(0)
     previous_p, bsdf_pdf, from_delta = mi.Point3f(0), mi.Float(1), mi.Bool(True)
     sample, dimension = mi.UInt32(start) - 1, mi.UInt32(0)
+    sought_there = None if mirrors is None else mi.Bool(False)
+    fewer = one_of_several(mirrors)
     alive = mi.Bool(False)  # on the way to a hit; at the beginning, all have to start
     running = first.is_valid() & (start < end) & (max_depth > 1)
 
-    while dr.hint(running, exclude=[sampler, clear], label="samples"):
+    while dr.hint(running, exclude=[sampler, clear, mirrors], label="samples"):
         met = pi.compute_surface_interaction(ray, active=alive)
-        found = _found_light(scene, met, previous_p, bsdf_pdf, from_delta)
+        found = _found_light(scene, met, previous_p, bsdf_pdf, from_delta,
+                             1.0 if fewer is None else fewer)
         total += dr.select(alive, beta * found, 0)
 
         alive &= met.is_valid() & (depth + 1 < max_depth)
@@ -229,6 +258,10 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
         smooth = running & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         total += beta * sought_light(scene, si, numbers, candidates, smooth, clear,
                                      max_depth - depth - 2)
+        seeks = mi.Bool(False)
+        if dr.hint(mirrors is not None, mode="scalar"):
+            seeks = smooth & (depth + 2 < max_depth)
+            total += beta * light_in_mirrors(scene, si, numbers, mirrors, seeks)
         bsdf_sample, bsdf_weight = bsdf.sample(mi.BSDFContext(), si, numbers.next_1d(),
                                                numbers.next_2d(), running)
         ray = si.spawn_ray(si.to_world(bsdf_sample.wo))
@@ -237,10 +270,19 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
         if dr.hint(clear is not None, mode="scalar"):
             assert clear is not None
             passes = goes_through(bsdf_sample, si.shape, clear, running)
+        is_delta = mi.has_flag(bsdf_sample.sampled_type, mi.BSDFFlags.Delta)
+        vertex = mi.Point3f(si.p)
+        if dr.hint(mirrors is not None, mode="scalar"):
+            assert mirrors is not None
+            row = mirrors.row(si.shape, running)
+            passes = alive & is_delta & sought_there & (row != 0)
+            vertex = dr.select(passes, mirrors.image(row - 1, previous_p, passes), vertex)
+            if dr.hint(fewer is not None, mode="scalar"):
+                fewer = dr.select(passes, mi.Float(1 / mirrors.count), 1)
+            sought_there = seeks & ~is_delta
+        previous_p = vertex if clear is None else dr.select(passes, previous_p, vertex)
         bsdf_pdf = dr.select(passes, bsdf_pdf, bsdf_sample.pdf)
-        from_delta = dr.select(passes, from_delta,
-                               mi.has_flag(bsdf_sample.sampled_type, mi.BSDFFlags.Delta))
-        previous_p = dr.select(passes, previous_p, si.p)
+        from_delta = dr.select(passes, from_delta, is_delta)
         alive = running & (dr.max(beta) > 0)
         depth += 1
         if dr.hint(max_depth > SHORT, mode="scalar"):

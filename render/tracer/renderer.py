@@ -127,7 +127,8 @@ class Renderer(View):
             if set(channels) & _TRACED:
                 radiance = trace(scene, seen, pi, sampler, self.scene.max_depth,
                                  self.candidates, self.lights_now, behind,
-                                 narrow=self._narrow, clear=self.stage.clear)
+                                 narrow=self._narrow, clear=self.stage.clear,
+                                 mirrors=self.mirrors)
                 if behind and behind.other:
                     radiance = self._with_layers(radiance, behind, sampler)
                 unit = dr.opaque(mi.Float, self.stage.unit)
@@ -182,7 +183,8 @@ class Renderer(View):
         pi = scene.ray_intersect_preliminary(layer.ray, coherent=False,
                                              active=dr.max(layer.throughput) > 0)
         other = trace(scene, layer.ray, pi, sampler, self.scene.max_depth, self.candidates,
-                      behind=layer, tell_straight=True, clear=self.stage.clear)
+                      behind=layer, tell_straight=True, clear=self.stage.clear,
+                      mirrors=self.mirrors)
         assert other.straight is not None
         light = other.emission + other.direct + other.indirect - other.straight
         light = dr.maximum(light, 0)  # (rounding)
@@ -203,7 +205,8 @@ class Renderer(View):
         candidates = candidates_for(scene)
         if dr.hint(not antialias, mode="scalar"):
             return sum_of_samples(scene, centre_ray, centre_pi, Sobol(keys, pixel, sample), sample,
-                                  end, self.scene.max_depth, candidates, self.stage.clear)
+                                  end, self.scene.max_depth, candidates, self.stage.clear,
+                                  self.mirrors)
         color = mi.Color3f(0)
         while dr.hint(sample < end, exclude=[scene, rays]):
             sampler = Sobol(keys, pixel, sample)
@@ -211,7 +214,7 @@ class Renderer(View):
             ray, _ = rays.at(x + jitter.x - 0.5, y + jitter.y - 0.5)
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
             radiance = trace(scene, ray, pi, sampler, self.scene.max_depth, candidates=candidates,
-                             clear=self.stage.clear)
+                             clear=self.stage.clear, mirrors=self.mirrors)
             color += radiance.emission + radiance.direct + radiance.indirect
             sample += 1
         return color

@@ -14,6 +14,7 @@ from onespp.scenes.description import Scene
 
 from .camera_rays import NO_JITTER, Offset, PixelRays, halton, pixel_rays
 from .lights.candidates import candidates_for
+from .lights.mirrors import Mirrors, find_mirrors
 from .lights.resampling import Lights
 from .lights.scene_lights import find_lights
 from .sampler import BlueNoise, Keys, Pcg, Sampler, Sobol, z_order
@@ -71,6 +72,11 @@ class View:
         if self.lights and (not self._told or self._told[0] != frame):
             self._told = frame, self.lights.now(self.stage.mi_scene)
         return self._told and self._told[1]
+
+    @property
+    def mirrors(self) -> Mirrors | None:
+        """Those that light is looked for in, at the frame that the stage is set to."""
+        return find_mirrors(self.stage)
 
     @cached_property
     def _lights_change(self) -> bool:
