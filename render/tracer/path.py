@@ -270,6 +270,7 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
         if dr.hint(clear is not None, mode="scalar"):
             assert clear is not None
             passes = goes_through(bsdf_sample, si.shape, clear, running)
+            from_delta, bsdf_pdf = from_delta | ~alive, dr.select(alive, bsdf_pdf, 1)  # at first
         is_delta = mi.has_flag(bsdf_sample.sampled_type, mi.BSDFFlags.Delta)
         vertex = mi.Point3f(si.p)
         if dr.hint(mirrors is not None, mode="scalar"):
