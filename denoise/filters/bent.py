@@ -11,9 +11,11 @@ asks for a wider filter). A tap, (x, y) pixels away, counts by
     exp(-2 k |x g_x + y g_y|^2),   k = n / (n + 3) / (1 + 3/4 (|g_x|^2 + |g_y|^2)),
 
 n being the length of the history: the longer it is, the less noise is there that would want a wider
-filter (as in `contact.py`). Along a tube its highlight is filtered, and not across. k lets
-something be filtered where normals differ without an order, as on bumps. dn is the mean of the
-differences to the two neighbours that see the same object.
+filter (as in `contact.py`). Where something is diffuse, too, g is 0: lamps' highlights are in
+unshadowed light, and what else a coat reflects is so little that its noise matters more. Along a
+tube its highlight is filtered, and not across. k lets something be filtered where normals differ
+without an order, as on bumps. dn is the mean of the differences to the two neighbours that see the
+same object.
 
 Our own; NRD compares each tap's normal with the lobe's angle instead.
 """
@@ -41,7 +43,8 @@ _LEAST = 0.75                  # of |g|^2, which k is divided by
 
 
 class Bend(NamedTuple):
-    """log2(e) 2 k times g_x . g_x, g_x . g_y and g_y . g_y; 0 where there is no lobe."""
+    """log2(e) 2 k times g_x . g_x, g_x . g_y and g_y . g_y; 0 where there is no lobe,
+    or a diffuse one."""
 
     xx: Float
     xy: Float
@@ -52,7 +55,8 @@ def bend(normals: Taps[Vector3], ids: Taps[Float], roughness: Float) -> Bend:
     """Of each pixel, for a history without end.
 
     Args:
-        normals: n, in any axes, and object IDs, at `BESIDE`. roughness: alpha, 1 for no lobe.
+        normals: n, in any axes, and object IDs, at `BESIDE`.
+        roughness: alpha, 1 where the bend is to be 0.
     """
     n, id_ = normals.at(-1), ids.at(-1)
 

@@ -141,7 +141,7 @@ def bends_of(frame: Frame, length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(h, w, 2, 3) by how many lobes a mirror direction turns from pixel to pixel, along a row and
     a column, such that a tap counts by exp(-|.|^2), and (h, w) how bent a surface is."""
     n, ids, alpha = frame["normal"].astype(float), frame["id"], roughness_of(frame)
-    alpha = np.where(layers_of(frame), 1, alpha)
+    alpha = np.where(bare(frame), alpha, 1)
     turn, (height, width) = np.zeros((*ids.shape, 2, 3)), ids.shape
     for y, x in np.argwhere(alpha < 1):
         for axis, (dy, dx) in enumerate(((0, 1), (1, 0))):
@@ -856,8 +856,8 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
                 narrow = contact(frame, m, name, ns[length_of(frame, "L")])
             before, factor = history, np.ones(found.shape)
             bends, bent = None, 0.0
-            if name == "G" and "roughness" in frame:
-                bends, bent = bends_of(frame, ns[length_of(frame, "L" if "L" in signals else "G")])
+            if name == "G" and "L" in signals and "roughness" in frame:
+                bends, bent = bends_of(frame, ns[length_of(frame, "L")])
             if name in "LG" and has_peaks:
                 wide = m.innovation_levels if "L" in signals else m.sharp_innovation_levels
                 twice = np.where(found, np.minimum(lum(d), lum(d - e)), 0)

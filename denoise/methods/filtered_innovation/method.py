@@ -100,7 +100,8 @@ class _Given(NamedTuple):
 
     alone: where a surface reflects (almost) nothing, or faces away, and mixes with its like alone.
     roughness, lobe: as of `Signals`, where there is glossy light; its image is the sharper the less
-    the former is, its history the longer the more the latter is. change: of the lights.
+    the former is, its history the longer the more the latter is. bare_lobe: the latter, 1 where
+    something is diffuse. change: of the lights.
     """
 
     frame: Frame
@@ -114,6 +115,7 @@ class _Given(NamedTuple):
     hits: Hits | None
     roughness: Float | None
     lobe: Float | None
+    bare_lobe: Float | None
     change: LightChange
 
 
@@ -256,6 +258,9 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             change = change_of_lights(state.lights, previous, frame)
             lights = sample_light(frame)
         layout = self._layout(light, rays is not None, stencil)
+        bare_lobe = None
+        if light.lobe is not None and light.is_bare is not None:
+            bare_lobe = dr.select(light.is_bare, light.lobe, 1)
         alone, away = light.texture.zero_albedo, None
         if light.unshadowed:  # by Mitsuba, whose silhouettes are so
             away = _facing_away(surface, light.texture, stencil)
@@ -274,18 +279,18 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         if of_gloss is None or SignalKind.GLOSSY not in layout.kinds:
             output, own, after = self._filtered(_Given(
                 frame, layout, light.listed, light.chosen, surface, alone, light.lit, rays,
-                hits, light.roughness, light.lobe, change), state)
+                hits, light.roughness, light.lobe, bare_lobe, change), state)
             return finished(output, own, after), replace(after, layered=None, lights=lights)
         signals, glossy = list(light.listed), layout.kinds.index(SignalKind.GLOSSY)
         rest, only_gloss = layout.without_gloss()
         (gloss,), _, layered = self._filtered(_Given(
             of_gloss, only_gloss, [signals.pop(glossy)], None, read_surface(of_gloss, stencil),
             read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, None, hits,
-            light.roughness, light.lobe, change),
+            light.roughness, light.lobe, None, change),
             state.layered or InnovationState(stencil, no_history(stencil)))
         output, own, after = self._filtered(_Given(
             frame, rest, signals, light.chosen, surface, alone, light.lit, rays, hits,
-            None, None, change), state)
+            None, None, None, change), state)
         output.insert(glossy, gloss)
         return finished(output, own, after), replace(after, layered=layered, lights=lights)
 
@@ -314,12 +319,12 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
             roughness = stencil.opaque(1) if given.roughness is None else given.roughness
         evaluate(signals, given.lit, sample, plane, id_,
                  (rays, given.hits, surface.position, roughness) if rays else None, chosen, lobes,
-                 narrower)
+                 narrower, given.bare_lobe)
 
         plane = passes.store_surface(id_, plane)
         if given.lit is not None:
             signals = passes.with_visibility_of_unlit(signals, given.lit, plane)
-        bends = passes.bends(sample.normal, given.lobe)
+        bends = passes.bends(sample.normal, given.bare_lobe)
         own, around = passes.surroundings(rays, given.hits, sample, surface.position, plane,
                                           chosen, roughness)
         before = state.image

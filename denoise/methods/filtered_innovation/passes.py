@@ -222,13 +222,12 @@ class Passes:
         self.surfaces.store(rough.share, first=_ROUGH)
         return self.loosen(self.ring, rough, plane)
 
-    def bends(self, normal: Vector3, lobe: Float | None) -> Bend | None:
-        """How surfaces are bent, after `store_surface`; lobe: roughness, None where there is no
-        glossy light, or it is not known."""
-        if lobe is None:
+    def bends(self, normal: Vector3, bare_lobe: Float | None) -> Bend | None:
+        """How surfaces are bent, after `store_surface`; bare_lobe: of `_Given`."""
+        if bare_lobe is None:
             return None
         self.buffer.store(list(normal), gutters=True)
-        return self.bend(*self.beside, lobe)
+        return self.bend(*self.beside, bare_lobe)
 
     def with_visibility_of_unlit(self, signals: list[Signal], lit: Float,
                                  plane: TangentPlane) -> list[Signal]:
