@@ -3,10 +3,10 @@
 Symbols (Veach 1997): beta, throughput of the path so far over its probability; p, a density over
 solid angle; `depth`, segments behind the current vertex.
 
-The estimator is that of Mitsuba's `path`, but that a vertex may compare several points of the
-lights (`candidates.py`), and that there is Russian roulette only where paths may have more than
-`SHORT` segments: shorter ones cost little, and all that arrives counts. It differs in what it
-returns: radiance split by the number of scattering events, from one primary hit that the G-buffer
+The estimator has the mean of Mitsuba's `path`, and less noise: a vertex may compare several points
+of the lights (`candidates.py`), looks for light through masks and panes (`panes.py`) and in flat
+mirrors (`mirrors.py`), and there is Russian roulette only where paths may have more than `SHORT`
+segments: shorter ones cost little, and all that arrives counts. It differs in what it returns: radiance split by the number of scattering events, from one primary hit that the G-buffer
 shares; and what a reflection needs: the part of indirect light whose first direction was sampled
 from a glossy or mirror lobe, and what that path met next. Where a surface has several lobes, that
 is an unbiased share of the whole (each direction counts as glossy with the probability that the
