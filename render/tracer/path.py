@@ -6,11 +6,12 @@ solid angle; `depth`, segments behind the current vertex.
 The estimator has the mean of Mitsuba's `path`, and less noise: a vertex may compare several points
 of the lights (`candidates.py`), looks for light through masks and panes (`panes.py`) and in flat
 mirrors (`mirrors.py`), and there is Russian roulette only where paths may have more than `SHORT`
-segments: shorter ones cost little, and all that arrives counts. It differs in what it returns: radiance split by the number of scattering events, from one primary hit that the G-buffer
-shares; and what a reflection needs: the part of indirect light whose first direction was sampled
-from a glossy or mirror lobe, and what that path met next. Where a surface has several lobes, that
-is an unbiased share of the whole (each direction counts as glossy with the probability that the
-glossy lobe chose it), not the glossy lobe's value alone: it costs nothing.
+segments: shorter ones cost little, and all that arrives counts. It differs in what it returns:
+radiance split by the number of scattering events, from one primary hit that the G-buffer shares;
+and what a reflection needs: the part of indirect light whose first direction was sampled from a
+glossy or mirror lobe, and what that path met next. Where a surface has several lobes, that is an
+unbiased share of the whole (each direction counts as glossy with the probability that the glossy
+lobe chose it), not the glossy lobe's value alone: it costs nothing.
 """
 
 from __future__ import annotations
