@@ -6,6 +6,7 @@ from statistics import median
 
 import click
 
+from onespp.api.loading import load
 from onespp.render.host.memory import require_memory
 
 from .arguments import LARGEST_SIDE
@@ -24,14 +25,14 @@ HEADER = (f"{'scene':24} {'lights':>6} {'M':>2} {'variance':>9} {'time':>6} {'be
               help="Frames that count.")
 @json_option
 def bench_render(scene: str, side: int, repeats: int, json_to: str | None) -> None:
-    """Time a frame of SCENE, all channels, against mi.render with `aov` around `path`.
+    """Time a frame of SCENE (a name, or a file), against mi.render with `aov` around `path`.
 
-    The same channels at 1 spp, in turns, after a warm-up; medians.
+    All channels at 1 spp, in turns, after a warm-up; medians.
     """
     require_memory(side, side)
     from onespp.render.study.frames import time_frames
 
-    ours, theirs = time_frames(scene, side, repeats)
+    ours, theirs = time_frames(load(scene), side, repeats)
     ratios = [b / a for a, b in zip(ours, theirs)]
     show_or_print({"scene": scene, "side": side, "ms": ours, "aov_ms": theirs,
                    "median_ratio": median(ratios)}, json_to, lambda: click.echo(
@@ -53,16 +54,16 @@ def bench_reference(scenes: tuple[str, ...], pixels: int, spp: int, repeats: int
                     json_to: str | None) -> None:
     """Measure references of SCENES against mi.render with `path`: error at equal time.
 
-    Default all scenes but the hard ones. The same depth, pixel centres and samples, in turns, after
-    a warm-up. Columns: lights; M, points of them that a vertex compares; how many times the
-    variance of a sample (in clipped sRGB) and the time that `path` has; and their product, how many
-    times less squared error ours has at equal time.
+    Names or files; default all scenes but the hard ones. The same depth, pixel centres and samples,
+    in turns, after a warm-up. Columns: lights; M, points of them that a vertex compares; how many
+    times the variance of a sample (in clipped sRGB) and the time that `path` has; and their
+    product, how many times less squared error ours has at equal time.
     """
     from onespp.render.study.efficiency import measure, size_of
     from onespp.scenes import catalog
 
     every = (*catalog.SCENES, *catalog.GENERATED)
-    loaded = [catalog.load(name) for name in scenes or every]
+    loaded = [load(name) for name in scenes or every]
     sizes = [size_of(scene, pixels) for scene in loaded]
     for height, width in sizes:
         require_memory(height, width)

@@ -7,15 +7,14 @@ import numpy as np
 from onespp.render.host.timed import timed
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.renderer import Renderer
-from onespp.scenes import catalog
+from onespp.scenes.description import Scene
 
 WARM_UP = 2
 AOVS = "albedo:albedo,N:sh_normal,P:position,Z:depth,ID:shape_index"
 
 
-def time_frames(scene_name: str, side: int, repeats: int) -> tuple[list[float], list[float]]:
+def time_frames(scene: Scene, side: int, repeats: int) -> tuple[list[float], list[float]]:
     """Milliseconds of our frames and of Mitsuba's, both to NumPy arrays, each seed once."""
-    scene = catalog.load(scene_name)
     renderer = Renderer(scene, side, side)
     sensor = renderer.stage.sensor(side, side)
     integrator = mi.load_dict({"type": "aov", "aovs": AOVS,
