@@ -33,7 +33,8 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.geometry.cameras import camera_from_screen
-from onespp.denoise.inputs.path_hits import SHIFT_WORDS, Hits
+from onespp.denoise.inputs.path_hits import Hits
+from onespp.denoise.inputs.shadow_rays import MATRIX_WORDS
 from onespp.denoise.jit.arrays import Float, Matrix3, Vector3
 from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.jit.vector import dot, opaque_matrix, transform
@@ -89,9 +90,9 @@ def image_motion(stencil: Stencil, hits: Hits, roughness: Float, normal: Vector3
     """u of each pixel, 0 where there is no lobe (roughness 1); position: X."""
     d = hits.distance
     met = (d > 0) & (hits.id >= 0) & (hits.id < hits.objects) & (roughness < 1)
-    hit = Vector3(*[dr.fma(d, r, x) for r, x in zip(_mirrored(position, normal), position)])
     row = stencil.UInt(dr.select(met, hits.id, 0))
-    shift = moved(stencil.unpack(hits.shifts, row, SHIFT_WORDS), hit)
+    shift = moved(stencil.unpack(hits.shifts, row, MATRIX_WORDS),
+                  seen_in(position, normal, d))
     far = d * _width(roughness)
     length = dr.sqrt(dot(shift, shift))
     return dr.select(met, dr.select(length < far, length / dr.select(met, far, 1), 1), 0)
@@ -106,6 +107,12 @@ def image_turned(stencil: Stencil, around: Float, before: Float, place: Place) -
     lane = stencil.UInt(place.y) * stencil.stride + stencil.UInt(place.x)
     left = dr.gather(stencil.Float, before, dr.select(place.inside, lane, 0), place.inside)
     return dr.minimum(_ENOUGH * dr.maximum(around, left), 1)
+
+
+def seen_in(position: Vector3, normal: Vector3, distance: Float) -> Vector3:
+    """X + d r, what a mirror at X shows, so far from it; camera space."""
+    return Vector3(*[dr.fma(distance, r, x)
+                     for r, x in zip(_mirrored(position, normal), position)])
 
 
 def _width(roughness: Float) -> Float:

@@ -11,7 +11,7 @@ from onespp.denoise.jit.arrays import Float
 from onespp.denoise.jit.grid import Stencil
 from onespp.render.frame import Frame
 
-SHIFT_WORDS = 16       # floats an object: three rows of a 4x4 matrix, padded
+from .shadow_rays import MATRIX_WORDS
 
 
 class Hits(NamedTuple):
@@ -39,9 +39,9 @@ def read_hits(frame: Frame, previous: Frame, stencil: Stencil) -> Hits:
 
 
 def shift_table(previous: Frame, frame: Frame) -> np.ndarray:
-    """(objects, 16) float32: of each object the three rows of V (M' M^-1 - I) V^-1, V being
+    """(objects, 16) float32: of each object the matrix V (M' M^-1 - I) V^-1, V being
     camera_from_world of the current frame: from a point of it, in camera space, to how far away it
     was. 0 for what is at rest, NaN where `world_motions` is."""
     v = frame.camera_from_world
     shift = v @ (world_motions(previous, frame) - np.eye(4)) @ np.linalg.inv(v)
-    return shift.astype(np.float32).reshape(-1, SHIFT_WORDS)
+    return shift.astype(np.float32).reshape(-1, MATRIX_WORDS)

@@ -64,9 +64,11 @@ class Images:
         listed = sorted(by_size[:most], key=names.__getitem__)
         self._mirrors = [by_name[names[i]] for i in listed]
         self._planes = [_plane(shape) for shape in self._mirrors]
-        self._plain = [i for i, index in enumerate(listed)
-                       if self._planes[i] is not None and _is_plain(shapes[index].bsdf())]
-        self.flat = [listed[i] for i in self._plain]
+        flat = [(index, mirror, plane) for index, mirror, plane
+                in zip(listed, self._mirrors, self._planes)
+                if plane is not None and _is_plain(shapes[index].bsdf())]
+        self.flat = [index for index, *_ in flat]
+        self._flat = [(mirror, plane) for _, mirror, plane in flat]
         self.masks = np.zeros(max(shapes) + 1, np.uint32)
         self.masks[[i for i, shape in shapes.items() if _is_mask(shape)]] = 1
         self.clear = np.zeros(max(shapes) + 1, np.uint32)
@@ -114,8 +116,8 @@ class Images:
 
     def flat_planes(self, frame: float) -> np.ndarray:
         """(n, 2, 3) a point and the unit normal of each of `flat`, world space."""
-        return np.array([_plane_at(self._mirrors[i].world_from_object_at(frame), *plane)
-                         for i in self._plain if (plane := self._planes[i])]).reshape(-1, 2, 3)
+        return np.array([_plane_at(mirror.world_from_object_at(frame), *plane)
+                         for mirror, plane in self._flat]).reshape(-1, 2, 3)
 
     def places(self, frame: float, world_from_object: np.ndarray) -> np.ndarray:
         """(n, 4, 4) of the objects -> those of objects and images, by ID, float64."""

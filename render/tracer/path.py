@@ -26,10 +26,9 @@ from onespp.render.mitsuba.variant import mi
 
 from .layers import is_straight
 from .lights.candidates import sought_light
-from .lights.mirrors import Mirrors, light_in_mirrors, one_of_several
-from .lights.panes import goes_through
+from .lights.mirrors import Mirrors, light_in_mirrors
+from .lights.origin import Origin, found_light
 from .lights.resampling import DirectLight, Lights, resample_lights
-from .lights.strata import power_heuristic
 from .replacement import Layer, Replaced
 from .sampler import Sampler, Sobol
 
@@ -94,18 +93,13 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     beta, eta = mi.Color3f(1), mi.Float(1) if max_depth > SHORT else None
     depth, longest, opacity = mi.UInt32(0), max_depth, None
     events = None if clear is None else mi.UInt32(0)  # of scattering, where they are not as many
-    previous_p = mi.Point3f(0)
-    bsdf_pdf = mi.Float(1)
-    from_delta = mi.Bool(True)
+    origin = Origin.camera(mirrors)
     active = mi.Bool(True)
     if dr.hint(behind is not None, mode="scalar"):
         assert behind is not None
         beta, longest = mi.Color3f(behind.throughput), max_depth - behind.before
         opacity = behind.opacity
         active = dr.max(behind.throughput) > 0  # a packet without layers takes no step
-
-    sought_there = None if mirrors is None else mi.Bool(False)  # in mirrors, by the last vertex
-    fewer = one_of_several(mirrors)  # times `surer`
 
     split = None
     if dr.hint(lights is not None, mode="scalar"):
@@ -133,17 +127,14 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         if dr.hint(lights is not None, mode="scalar"):
             assert lights is not None
             surer = dr.select((order == 1) & si.is_valid(), lights.emitters, 1)
-        if dr.hint(fewer is not None, mode="scalar"):
-            assert fewer is not None
-            surer = surer * fewer
-        found = beta * _found_light(scene, si, previous_p, bsdf_pdf, from_delta, surer)
+        found = beta * found_light(scene, si, origin, surer)
 
         # Light that this vertex looks for: one shadow ray.
         inner = si.is_valid() & (depth + 1 < longest)
         smooth = inner & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         if dr.hint(lights is not None, mode="scalar"):
             smooth &= depth > 0
-            arrived += dr.select((order == 1) & ~from_delta, found, 0)
+            arrived += dr.select((order == 1) & ~origin.from_delta, found, 0)
         sought = beta * sought_light(scene, si, sampler, candidates, smooth, clear,
                                      longest - depth - 2)
         mirrored, seeks = mi.Color3f(0), mi.Bool(False)
@@ -170,33 +161,19 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         onward = si.spawn_ray(si.to_world(bsdf_sample.wo))
         o, d = onward.o, onward.d
         beta *= bsdf_weight
-        is_delta = mi.has_flag(bsdf_sample.sampled_type, mi.BSDFFlags.Delta)
-        through_gloss |= (depth == 0) & (is_delta | mi.has_flag(bsdf_sample.sampled_type,
-                                                                mi.BSDFFlags.Glossy))
+        is_delta, is_glossy = (mi.has_flag(bsdf_sample.sampled_type, flag)
+                               for flag in (mi.BSDFFlags.Delta, mi.BSDFFlags.Glossy))
+        through_gloss |= (depth == 0) & (is_delta | is_glossy)
         if dr.hint(tell_straight, mode="scalar"):
             assert straight is not None
             assert stays_straight is not None
             straight += dr.select(stays_straight, found, 0)
             stays_straight &= is_straight(bsdf_sample, 1.0 if opacity is None else
                                           dr.select(depth == 0, opacity, 1))
-        passes = mi.Bool(False)
-        if dr.hint(clear is not None, mode="scalar"):
-            assert clear is not None
+        origin, is_same = origin.after(si, bsdf_sample, clear, mirrors, seeks, inner)
+        if dr.hint(events is not None, mode="scalar"):
             assert events is not None
-            passes = goes_through(bsdf_sample, si.shape, clear, inner)
-            events += dr.select(passes, mi.UInt32(0), 1)
-        vertex = mi.Point3f(si.p)
-        if dr.hint(mirrors is not None, mode="scalar"):
-            assert mirrors is not None
-            row = mirrors.row(si.shape, inner)
-            passes = is_delta & sought_there & (row != 0)
-            vertex = dr.select(passes, mirrors.image(row - 1, previous_p, passes), vertex)
-            if dr.hint(fewer is not None, mode="scalar"):
-                fewer = dr.select(passes, mi.Float(1 / mirrors.count), 1)
-            sought_there = seeks & ~is_delta
-        previous_p = vertex if events is None else dr.select(passes, previous_p, vertex)
-        bsdf_pdf = dr.select(passes, bsdf_pdf, bsdf_sample.pdf)
-        from_delta = dr.select(passes, from_delta, is_delta)
+            events += dr.select(is_same, mi.UInt32(0), 1)
         active = inner & (dr.max(beta) > 0)
         depth += 1
         if dr.hint(max_depth > SHORT, mode="scalar"):
@@ -234,18 +211,14 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
     ray = mi.Ray3f(ray)
     pi = mi.PreliminaryIntersection3f(pi)
     beta, eta, depth = mi.Color3f(0), mi.Float(1), mi.UInt32(0)
-    previous_p, bsdf_pdf, from_delta = mi.Point3f(0), mi.Float(1), mi.Bool(True)
+    origin = Origin.camera(mirrors)
     sample, dimension = mi.UInt32(start) - 1, mi.UInt32(0)
-    sought_there = None if mirrors is None else mi.Bool(False)
-    fewer = one_of_several(mirrors)
     alive = mi.Bool(False)  # on the way to a hit; at the beginning, all have to start
     running = first.is_valid() & (start < end) & (max_depth > 1)
 
     while dr.hint(running, exclude=[sampler, clear, mirrors], label="samples"):
         met = pi.compute_surface_interaction(ray, active=alive)
-        found = _found_light(scene, met, previous_p, bsdf_pdf, from_delta,
-                             1.0 if fewer is None else fewer)
-        total += dr.select(alive, beta * found, 0)
+        total += dr.select(alive, beta * found_light(scene, met, origin), 0)
 
         alive &= met.is_valid() & (depth + 1 < max_depth)
         sample += dr.select(alive, mi.UInt32(0), 1)
@@ -267,24 +240,7 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
                                                numbers.next_2d(), running)
         ray = si.spawn_ray(si.to_world(bsdf_sample.wo))
         beta *= bsdf_weight
-        passes = mi.Bool(False)
-        if dr.hint(clear is not None, mode="scalar"):
-            assert clear is not None
-            passes = goes_through(bsdf_sample, si.shape, clear, running)
-            from_delta, bsdf_pdf = from_delta | ~alive, dr.select(alive, bsdf_pdf, 1)  # at first
-        is_delta = mi.has_flag(bsdf_sample.sampled_type, mi.BSDFFlags.Delta)
-        vertex = mi.Point3f(si.p)
-        if dr.hint(mirrors is not None, mode="scalar"):
-            assert mirrors is not None
-            row = mirrors.row(si.shape, running)
-            passes = alive & is_delta & sought_there & (row != 0)
-            vertex = dr.select(passes, mirrors.image(row - 1, previous_p, passes), vertex)
-            if dr.hint(fewer is not None, mode="scalar"):
-                fewer = dr.select(passes, mi.Float(1 / mirrors.count), 1)
-            sought_there = seeks & ~is_delta
-        previous_p = vertex if clear is None else dr.select(passes, previous_p, vertex)
-        bsdf_pdf = dr.select(passes, bsdf_pdf, bsdf_sample.pdf)
-        from_delta = dr.select(passes, from_delta, is_delta)
+        origin, _ = origin.begun(~alive).after(si, bsdf_sample, clear, mirrors, seeks, running)
         alive = running & (dr.max(beta) > 0)
         depth += 1
         if dr.hint(max_depth > SHORT, mode="scalar"):
@@ -310,21 +266,6 @@ def _roulette(beta: mi.Color3f, eta: mi.Float, depth: mi.UInt32,
     tried = depth >= FIRST
     return (dr.select(tried & (likely > 0), beta / likely, beta),
             ~tried | (choice < likely))
-
-
-def _found_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, previous_p: mi.Point3f,
-                 bsdf_pdf: mi.Float, from_delta: mi.Bool,
-                 surer: mi.Float | float = 1.0) -> mi.Color3f:
-    """Radiance of what a direction from `previous_p` met, weighed against light sampling.
-
-    Args:
-        surer: how many times the density of light sampling counts, as of `strata.py`.
-    """
-    reference = dr.zeros(mi.Interaction3f)
-    reference.p = previous_p
-    hit = mi.DirectionSample3f(scene, si, reference)
-    emitter_pdf = scene.pdf_emitter_direction(reference, hit, ~from_delta)
-    return power_heuristic(bsdf_pdf, surer * emitter_pdf) * hit.emitter.eval(si)
 
 
 def _with_split(radiance: Radiance, arrived: mi.Color3f | None,

@@ -202,19 +202,18 @@ class Renderer(View):
         centre_ray, _ = rays.at(x, y)
         centre_pi = scene.ray_intersect_preliminary(centre_ray, coherent=True)
         sample, end = dr.opaque(mi.UInt32, start), dr.opaque(mi.UInt32, start + count)
-        candidates = candidates_for(scene)
+        candidates, clear, mirrors = candidates_for(scene), self.stage.clear, self.mirrors
         if dr.hint(not antialias, mode="scalar"):
             return sum_of_samples(scene, centre_ray, centre_pi, Sobol(keys, pixel, sample), sample,
-                                  end, self.scene.max_depth, candidates, self.stage.clear,
-                                  self.mirrors)
+                                  end, self.scene.max_depth, candidates, clear, mirrors)
         color = mi.Color3f(0)
-        while dr.hint(sample < end, exclude=[scene, rays]):
+        while dr.hint(sample < end, exclude=[scene, rays, clear, mirrors]):
             sampler = Sobol(keys, pixel, sample)
             jitter = sampler.next_2d()
             ray, _ = rays.at(x + jitter.x - 0.5, y + jitter.y - 0.5)
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
             radiance = trace(scene, ray, pi, sampler, self.scene.max_depth, candidates=candidates,
-                             clear=self.stage.clear, mirrors=self.mirrors)
+                             clear=clear, mirrors=mirrors)
             color += radiance.emission + radiance.direct + radiance.indirect
             sample += 1
         return color

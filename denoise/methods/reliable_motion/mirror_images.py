@@ -27,6 +27,7 @@ import drjit as dr
 import numpy as np
 
 from onespp.denoise.geometry.cameras import screen_from_camera
+from onespp.denoise.history.reflections import seen_in
 from onespp.denoise.history.reprojection import Place
 from onespp.denoise.history.shadow_motion import moved
 from onespp.denoise.inputs.shadow_rays import MATRIX_WORDS, shadow_table
@@ -76,12 +77,7 @@ def image_place(stencil: Stencil, surface: SurfaceSample, reflection: Reflection
         row = 2 * stencil.UInt(dr.select(has_image, object_, 0))
         return moved(stencil.unpack(table, row, MATRIX_WORDS), point)
 
-    scale = dr.rsqrt(dr.maximum(dot(position, position), 1e-30))
-    view = Vector3(*[x * scale for x in position])
-    n = surface.normal
-    twice = 2 * dot(view, n)
-    hit = before(hit_id, Vector3(*[dr.fma(distance, v - twice * c, x)
-                                   for v, c, x in zip(view, n, position)]))
+    hit = before(hit_id, seen_in(position, surface.normal, distance))
     foot = before(stencil.Float(surface.id), position)
     normal = place.normal
     height = dot(Vector3(*[h - f for h, f in zip(hit, foot)]), normal)

@@ -89,12 +89,6 @@ def find_mirrors(stage: MitsubaScene) -> Mirrors | None:
                    aligned(mi.UInt32, rows), len(shapes))
 
 
-def one_of_several(mirrors: Mirrors | None) -> mi.Float | None:
-    """By how much densities of light sampling count, at the beginning of a path: behind a mirror
-    1 / M; None where they always count in full."""
-    return None if mirrors is None or mirrors.count == 1 else mi.Float(1)
-
-
 @dr.syntax
 def light_in_mirrors(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler, mirrors: Any,
                      active: mi.Bool) -> mi.Color3f:

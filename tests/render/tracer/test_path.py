@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes import catalog
 from tests.support.furnace import furnace
+from tests.support.path_images import path_images
 from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
 
 ALBEDO, EMISSION, DEPTH = 0.6, 0.8, 5
@@ -50,10 +50,7 @@ def test_samples_have_the_mean_of_mitsubas_path(name):
     renderer = Renderer(scene, height, width)
     ours = [renderer.sample_sum(frame, 0, k, spp, antialias=True) / spp
             for k in range(replicates)]
-    path = mi.load_dict({"type": "path", "max_depth": scene.max_depth, "rr_depth": 1000})
-    sensor = renderer.stage.sensor(height, width)
-    theirs = [mi.render(renderer.stage.mi_scene, sensor=sensor, integrator=path, spp=spp,
-                        seed=k).numpy() for k in range(replicates)]
+    theirs = path_images(renderer, spp, replicates)
     a, b = ([blocks(image, 8) for image in images] for images in (ours, theirs))
     assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
 

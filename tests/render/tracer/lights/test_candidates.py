@@ -21,6 +21,7 @@ from onespp.scenes import catalog
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.transforms import look_at, rotate, scale, translate
 from tests.render.tracer.test_renderer import gray
+from tests.support.path_images import path_images
 from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
 
 BLACK = {"type": "diffuse", "reflectance": 0.0}
@@ -69,11 +70,8 @@ def samples(scene: Scene, candidates: int | None, monkeypatch, replicates: int, 
 def test_candidates_have_the_mean_of_mitsubas_path(make, candidates, monkeypatch):
     scene, replicates, spp = make(), 16, 64
     ours = samples(scene, candidates, monkeypatch, replicates, spp)
-    renderer = Renderer(scene, HEIGHT, WIDTH)
-    path = mi.load_dict({"type": "path", "max_depth": scene.max_depth, "rr_depth": 1000})
-    theirs = [blocks(mi.render(renderer.stage.mi_scene, sensor=renderer.stage.sensor(HEIGHT, WIDTH),
-                               integrator=path, spp=spp, seed=k).numpy(), BLOCK)
-              for k in range(replicates)]
+    theirs = [blocks(image, BLOCK)
+              for image in path_images(Renderer(scene, HEIGHT, WIDTH), spp, replicates)]
     assert_same_mean(*mean_and_variance(ours), *mean_and_variance(theirs))
 
 

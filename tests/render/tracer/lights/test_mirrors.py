@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from onespp.render.channels import FRAME, GLOSS, SPLIT
-from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer import view
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Disk, Light, Mesh, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.materials import diffuse, mirror, pane, varnish
 from onespp.scenes.transforms import look_at, rotate, scale, translate
+from tests.support.path_images import path_images
 from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
 
 X, Y = (1, 0, 0), (0, 1, 0)
@@ -53,10 +53,7 @@ def test_paths_have_the_mean_of_mitsubas_path(depth):
     spp, replicates = 64, 16
     ours = [renderer.sample_sum(1, 0, k, spp, antialias=True) / spp for k in range(replicates)]
     samples = [renderer.sample_sum(1, 1, k, spp) / spp for k in range(replicates)]
-    path = mi.load_dict({"type": "path", "max_depth": depth, "rr_depth": 1000})
-    sensor = renderer.stage.sensor(HEIGHT, WIDTH)
-    theirs = [mi.render(renderer.stage.mi_scene, sensor=sensor, integrator=path, spp=4 * spp,
-                        seed=k).numpy() for k in range(replicates)]
+    theirs = path_images(renderer, 4 * spp, replicates)
     a, b = ([blocks(image, 8) for image in images] for images in (ours, theirs))
     assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
     frames = [renderer.frame(1, k, ("color",))["color"] for k in range(100)]

@@ -11,6 +11,7 @@ from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape
 from onespp.scenes.materials import diffuse, pane, varnish
 from onespp.scenes.transforms import look_at, rotate, scale, translate
+from tests.support.path_images import path_images
 from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
 
 X, Y = (1, 0, 0), (0, 1, 0)
@@ -59,10 +60,7 @@ def test_paths_have_the_mean_of_mitsubas_path(depth):
     renderer = Renderer(under(*MIXED, depth=depth, lamp=1.2), HEIGHT, WIDTH)
     spp, replicates = 64, 16
     ours = [renderer.sample_sum(0, 0, k, spp, antialias=True) / spp for k in range(replicates)]
-    path = mi.load_dict({"type": "path", "max_depth": depth, "rr_depth": 1000})
-    sensor = renderer.stage.sensor(HEIGHT, WIDTH)
-    theirs = [mi.render(renderer.stage.mi_scene, sensor=sensor, integrator=path, spp=4 * spp,
-                        seed=k).numpy() for k in range(replicates)]
+    theirs = path_images(renderer, 4 * spp, replicates)
     a, b = ([blocks(image, 8) for image in images] for images in (ours, theirs))
     assert np.mean(a) > 0.005
     assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
@@ -81,24 +79,23 @@ def test_frames_have_the_mean_of_the_reference(direct, floor):
 
 @pytest.mark.parametrize("depth", [2, 3, 8])
 def test_so_has_what_the_camera_sees_through_them_before_a_sky(depth):
-    """Of many samples, each begins at the camera anew, also after one that ended where a normal
-    map lets nothing be drawn."""
+    """And a lamp. Of many samples, each begins at the camera anew, also after one that ended where
+    a normal map lets nothing be drawn."""
     materials = (veil(diffuse((0.3, 0.8, 0.3)), CHECKS), pane(), veil(diffuse((0.7, 0.7, 0.7))))
     tilted = {"type": "normalmap", "bsdf": diffuse((0.6, 0.6, 0.2)), "normalmap": {
         "type": "bitmap", "raw": True,
         "bitmap": mi.Bitmap(np.full((2, 2, 3), [0.95, 0.5, 0.7], np.float32))}}
-    shapes = (sheet("tilted", 0.8, veil(tilted, 0.5), size=1.2),
+    lamp = Shape("lamp", Rectangle(), diffuse((0.0, 0.0, 0.0)),
+                 translate((0, 2.4, -1.1)) @ rotate(X, 90) @ scale(0.4), (2.0, 3.0, 4.0))
+    shapes = (lamp, sheet("tilted", 0.8, veil(tilted, 0.5), size=1.2),
               *(sheet(f"sheet {i}", 1 + 0.3 * i, material, size=1.2, x=0.5 * i)
                 for i, material in enumerate(materials)))
     before = Scene("sky", "for a test", shapes, Camera(look_at((0, -1, 2), (0, 1.2, 0)), fov=60), 1,
                    WIDTH, HEIGHT, max_depth=depth, environment=0.8)
     renderer = Renderer(before, HEIGHT, WIDTH, direct="resampled")
-    path = mi.load_dict({"type": "path", "max_depth": depth, "rr_depth": 1000})
-    sensor = renderer.stage.sensor(HEIGHT, WIDTH)
     images = [[renderer.sample_sum(0, 0, k, 64, antialias=antialias) / 64 for k in range(16)]
               for antialias in (True, False)]
-    theirs = [mi.render(renderer.stage.mi_scene, sensor=sensor, integrator=path, spp=64,
-                        seed=k).numpy() for k in range(16)]
+    theirs = path_images(renderer, 64, 16)
     frames = [renderer.frame(0, k, ("color",))["color"] for k in range(150)]
     for a, b in ((images[0], theirs), (images[1], frames)):
         assert_same_mean(*mean_and_variance([blocks(image, 8) for image in a]),
