@@ -82,8 +82,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         mirrors: of the scene as it stands, None where no light is looked for in any.
     """
     context = mi.BSDFContext()
-    o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
-    pi = mi.PreliminaryIntersection3f(pi)
+    o, d, pi = mi.Point3f(ray.o), mi.Vector3f(ray.d), _as_state(pi)
     emission, direct, indirect = mi.Color3f(0), mi.Color3f(0), mi.Color3f(0)
     specular, through_gloss = mi.Color3f(0), mi.Bool(False)
     hit_distance, hit_shape, hit_face = mi.Float(0), mi.UInt32(0), mi.UInt32(0)
@@ -208,16 +207,15 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
     """
     first = pi.compute_surface_interaction(ray)
     total = mi.Float(end - start) * first.emitter(scene).eval(first)
-    ray = mi.Ray3f(ray)
-    pi = mi.PreliminaryIntersection3f(pi)
+    o, d, pi = mi.Point3f(ray.o), mi.Vector3f(ray.d), _as_state(pi)
     beta, eta, depth = mi.Color3f(0), mi.Float(1), mi.UInt32(0)
     origin = Origin.camera(mirrors)
     sample, dimension = mi.UInt32(start) - 1, mi.UInt32(0)
     alive = mi.Bool(False)  # on the way to a hit; at the beginning, all have to start
     running = first.is_valid() & (start < end) & (max_depth > 1)
 
-    while dr.hint(running, exclude=[sampler, clear, mirrors], label="samples"):
-        met = pi.compute_surface_interaction(ray, active=alive)
+    while dr.hint(running, exclude=[first, end, sampler, clear, mirrors], label="samples"):
+        met = pi.compute_surface_interaction(mi.Ray3f(o, d), active=alive)
         total += dr.select(alive, beta * found_light(scene, met, origin), 0)
 
         alive &= met.is_valid() & (depth + 1 < max_depth)
@@ -238,7 +236,8 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
             total += beta * light_in_mirrors(scene, si, numbers, mirrors, seeks)
         bsdf_sample, bsdf_weight = bsdf.sample(mi.BSDFContext(), si, numbers.next_1d(),
                                                numbers.next_2d(), running)
-        ray = si.spawn_ray(si.to_world(bsdf_sample.wo))
+        onward = si.spawn_ray(si.to_world(bsdf_sample.wo))
+        o, d = onward.o, onward.d
         beta *= bsdf_weight
         origin, _ = origin.begun(~alive).after(si, bsdf_sample, clear, mirrors, seeks, running)
         alive = running & (dr.max(beta) > 0)
@@ -248,8 +247,21 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
             beta, goes_on = _roulette(beta, eta, depth, numbers.next_1d())
             alive &= goes_on
         dimension = mi.UInt32(numbers.dimension)
-        pi = scene.ray_intersect_preliminary(ray, coherent=False, active=alive)
+        pi = scene.ray_intersect_preliminary(onward, coherent=False, active=alive)
     return total
+
+
+def _as_state(pi: mi.PreliminaryIntersection3f) -> mi.PreliminaryIntersection3f:
+    """A copy to be the state of a loop, without constants.
+
+    What Embree alone needs OptiX leaves 0, before the loop and in it, and Dr.Jit records a loop a
+    second time without a state that is a constant.
+    """
+    pi = mi.PreliminaryIntersection3f(pi)
+    for field in (pi.valid, pi.shape_index, pi.instance):
+        if field.state == dr.VarState.Literal:
+            dr.make_opaque(field)
+    return pi
 
 
 def _roulette(beta: mi.Color3f, eta: mi.Float, depth: mi.UInt32,

@@ -9,6 +9,7 @@ import drjit as dr
 import pytest
 
 from onespp.render.channels import FRAME, GLOSS, REPLAY, SHADOW, SPLIT
+from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer import layers, path, replacement
 from onespp.render.tracer.lights import candidates
 from onespp.render.tracer.renderer import Renderer
@@ -100,3 +101,27 @@ def test_no_loop_is_recorded_twice(name, paths, steps, monkeypatch):
     renderer = Renderer(catalog.load(name), HEIGHT, WIDTH, direct="resampled", sampler="zsobol")
     renderer.frame(0, 0, renderer.channels)
     assert [counted.call_count for counted in counts] == [paths, paths, *steps]
+
+
+@pytest.mark.parametrize("name", ["box", "hard/mirror"])
+def test_nor_is_that_of_a_reference(name, monkeypatch):
+    counted = Mock(wraps=path.sought_light)
+    monkeypatch.setattr(path, "sought_light", counted)
+    Renderer(catalog.load(name), HEIGHT, WIDTH).sample_sum(0, 0, 0, 2, antialias=False)
+    assert counted.call_count == 1
+
+
+def test_nor_if_hits_have_constants_as_those_of_optix(monkeypatch):
+    met = mi.Scene.ray_intersect_preliminary
+
+    def with_constants(*arguments, **named):
+        pi = met(*arguments, **named)
+        pi.valid, pi.instance = mi.Bool(True), dr.zeros(mi.ShapePtr)
+        return pi
+
+    monkeypatch.setattr(mi.Scene, "ray_intersect_preliminary", with_constants)
+    counted = Mock(wraps=path.sought_light)
+    monkeypatch.setattr(path, "sought_light", counted)
+    renderer = Renderer(catalog.load("box"), HEIGHT, WIDTH, direct="resampled", sampler="zsobol")
+    renderer.frame(0, 0, renderer.channels)
+    assert counted.call_count == 1
