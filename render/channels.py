@@ -38,6 +38,7 @@ class Group(Enum):
     SHADOW = "the shadow ray at the first hit"
     GROUPED = "direct light by groups of lights, of scenes that have several"
     GLOSS = "reflections, of scenes that have glossy surfaces"
+    CAUSTIC = "lamps by way of glass and mirrors, of scenes that have smooth balls"
     LAYER = "what else is seen, of scenes that have glass or masks"
     REPLAY = "samples of the last frame, shaded again"
     MOTION = "of imports alone, whose motion no matrices tell"
@@ -88,7 +89,7 @@ def _rgb(layer: str) -> tuple[str, ...]:
 
 MOST_GROUPS = 4  # of lights, each with a visibility of its own
 SUN = -2  # `light_id` of the environment's brightest spot, where it is a light of its own
-TRACING = 7
+TRACING = 8
 """Counts the changes of what frames hold. Raise it whenever the same scene, frame and seed give
 other values than rounding explains in any channel, of frames or references: sequences and data sets
 begun before are then not continued. One number serves both, since what changes the mean of light
@@ -100,6 +101,8 @@ under half-open masks mirrors and glass show lamps; the sun of a sky is a light 
 4: of more than 64 lights fewer are cut, of more than 96 some speak for others (`clusters.py`).
 5: of several lights, lamps count in direct light as if they were picked for sure (`strata.py`).
 6: where lobes are narrow, unshadowed light has nothing of the sky (`resampling.py`).
+7: shadow rays go through masks and panes, and light is looked for in flat mirrors (`mirrors.py`).
+8: light is looked for by way of smooth balls (`balls.py`).
 """
 
 _ROWS = (
@@ -159,6 +162,9 @@ _ROWS = (
             "object ID of what the path met next; -1: nothing"),
     Channel("roughness", Group.GLOSS, ("roughness",), HALF, Display.UNIT, 1.0,
             "GGX alpha of the surface's glossy lobe; 0: a mirror or a hole, 1: no such lobe"),
+    Channel("caustic", Group.CAUSTIC, _rgb("caustic"), FLOAT, Display.LIGHT, 0.0,
+            "part of `indirect` that lamps send to the first hit through one ball of glass, or by "
+            "its reflection or that of one of metal; not demodulated"),
     Channel("layer_share", Group.LAYER, ("layer.A",), FLOAT, Display.UNIT, 0.0,
             "share that the brightest other layer has in what glass or a mask shows, by what of "
             "its light gets here; 0: there is none"),
@@ -204,9 +210,10 @@ def channels_of(*groups: Group) -> tuple[str, ...]:
     return tuple(row.name for group in groups for row in _ROWS if row.group is group)
 
 
-RADIANCE, PATH, SPLIT, SHADOW, GROUPED, GLOSS, LAYER, REPLAY = (channels_of(group) for group in (
-    Group.RADIANCE, Group.PATH, Group.SPLIT, Group.SHADOW, Group.GROUPED, Group.GLOSS, Group.LAYER,
-    Group.REPLAY))
+RADIANCE, PATH, SPLIT, SHADOW, GROUPED, GLOSS, CAUSTIC, LAYER, REPLAY = (
+    channels_of(group) for group in (
+        Group.RADIANCE, Group.PATH, Group.SPLIT, Group.SHADOW, Group.GROUPED, Group.GLOSS,
+        Group.CAUSTIC, Group.LAYER, Group.REPLAY))
 UNSHADOWED = tuple(name for name in GROUPED if name.startswith("unshadowed"))
 FRAME = channels_of(Group.RADIANCE, Group.GUIDES, Group.PATH)
 """What can be said of every scene."""

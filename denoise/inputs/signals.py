@@ -21,7 +21,8 @@ group. With y, omega and P of `resampling.py`,
 What the BSDF's sample finds of the lights is in L. (As a share of U - sum U_g it loses 0.6 dB on
 average: midpoints of a sky's strata say little of what a sample of a lobe finds.)
 
-A frame that lacks the split has D in L; one without direct light, its colour.
+A frame that lacks the split has D in L; one without direct light, its colour. C, the part of I that
+lamps send by way of balls, is as sharp as they are small: where a frame tells it, L is without C/a.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ from onespp.render.frame import Frame
 from .demodulation import Texture, read_texture
 from .repair import repair
 
-USED = ("direct", "indirect", "unshadowed", "visibility", "specular", "roughness",
+USED = ("direct", "indirect", "unshadowed", "visibility", "specular", "roughness", "caustic",
         *LAYER, *GROUPED)
 LARGEST_VISIBILITY = 2.0
 
@@ -89,7 +90,7 @@ class Signals:
         roughness: where G is apart and its lobes are known.
         lobe: the same, but 1 where G is the (diffuse) light of a layer. of_gloss: texture of G,
             where that is known (`layers.py`). is_bare: where L is 0, nothing being diffuse; None
-            where that is not known.
+            where that is not known. caustic: C / a, None where there is none.
     """
 
     kinds: tuple[SignalKind, ...]
@@ -102,6 +103,7 @@ class Signals:
     lobe: Float | None = None
     of_gloss: Texture = field(default_factory=Texture)
     is_bare: Bool | None = None
+    caustic: Color | None = None
 
     @property
     def groups(self) -> int:
@@ -144,6 +146,11 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
     if "emission" in frame and not texture.emission:
         texture = Texture(texture.albedo, Color(*load("emission")), texture.zero_albedo)
     light = Color(*[d + i for d, i in zip(load("direct"), load("indirect"))])
+    caustic = None
+    if "caustic" in frame:
+        sent = Color(*load("caustic"))
+        light = Color(*[c - k for c, k in zip(light, sent)])
+        caustic = Texture(texture.albedo).demodulate(sent)
     kinds, apart, unshadowed, chosen, roughness = [SignalKind.DIFFUSE], [], [], None, None
     texture_of_gloss, lobe, lit, is_bare = Texture(), None, None, None
     if gloss and "specular" in frame:
@@ -187,7 +194,7 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
         light = _black_where(is_bare, light)
     diffuse = _of_light(Texture(texture.albedo).demodulate(light))
     return Signals(tuple(kinds), [diffuse, *apart], unshadowed, texture, chosen, lit, roughness,
-                   lobe, texture_of_gloss, is_bare)
+                   lobe, texture_of_gloss, is_bare, caustic)
 
 
 def _capped(visibility: Float) -> Float:

@@ -23,7 +23,7 @@ from collections.abc import Mapping
 import drjit as dr
 import numpy as np
 
-from onespp.scenes.description import Disk, Mesh, Rectangle, Scene, Shape
+from onespp.scenes.description import Disk, Mesh, Rectangle, Scene, Shape, Sphere
 
 from .appearance import nested
 from .variant import mi
@@ -45,7 +45,8 @@ class Images:
         rows: (registry indices) uint32, which row of images is in a shape, from 1; 0: none.
         masks: (registry indices) uint32, 1 for shapes cut out by a mask. clear: the same, for those
             that let light straight through.
-        flat: registry indices of flat mirrors that nothing but their shape bends.
+        flat: registry indices of flat mirrors that nothing but their shape bends. round: of smooth
+            spheres, of metal or denser than what is around. index: (round,) of refraction, 0: none.
         in_several: the row of what is seen in one after another. layered: whether anything lets
             light through.
 
@@ -69,6 +70,12 @@ class Images:
                 if plane is not None and _is_plain(shapes[index].bsdf())]
         self.flat = [index for index, *_ in flat]
         self._flat = [(mirror, plane) for _, mirror, plane in flat]
+        round_ = [(index, mirror, _of_refraction(shapes[index].bsdf())) for index, mirror
+                  in zip(listed, self._mirrors)
+                  if isinstance(mirror.geometry, Sphere) and not mirror.geometry.flipped]
+        round_ = [(index, ball, eta) for index, ball, eta in round_ if eta is not None]
+        self.round, self._round = [i for i, *_ in round_], [ball for _, ball, _ in round_]
+        self.index = np.array([eta for *_, eta in round_], np.float32)
         self.masks = np.zeros(max(shapes) + 1, np.uint32)
         self.masks[[i for i, shape in shapes.items() if _is_mask(shape)]] = 1
         self.clear = np.zeros(max(shapes) + 1, np.uint32)
@@ -119,6 +126,12 @@ class Images:
         return np.array([_plane_at(mirror.world_from_object_at(frame), *plane)
                          for mirror, plane in self._flat]).reshape(-1, 2, 3)
 
+    def balls(self, frame: float) -> np.ndarray:
+        """(n, 4) centre and radius of each of `round`, world space."""
+        places = [ball.world_from_object_at(frame) for ball in self._round]
+        return np.array([[*place[:3, 3], np.linalg.norm(place[:3, 0])]
+                         for place in places]).reshape(-1, 4)
+
     def places(self, frame: float, world_from_object: np.ndarray) -> np.ndarray:
         """(n, 4, 4) of the objects -> those of objects and images, by ID, float64."""
         if not self._are_there:
@@ -167,6 +180,14 @@ def _is_plain(bsdf: mi.BSDF) -> bool:
     kind = bsdf.class_name()
     return kind == "SmoothConductor" or (kind == "TwoSidedBRDF" and all(map(_is_plain,
                                                                             nested(bsdf))))
+
+
+def _of_refraction(bsdf: mi.BSDF) -> float | None:
+    """Index of glass that is denser than what is around it, 0 of a mirror; None of others."""
+    if bsdf.class_name() != "SmoothDielectric":
+        return 0.0 if _is_plain(bsdf) else None
+    eta = float(mi.traverse(bsdf)["eta"])
+    return eta if eta > 1 else None
 
 
 def _is_mask(shape: mi.Shape) -> bool:

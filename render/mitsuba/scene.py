@@ -202,6 +202,14 @@ class MitsubaScene:
         return (np.array(self.images.flat, np.uint32),
                 np.concatenate([normal, distance], -1).astype(np.float32))
 
+    def balls(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Registry indices (m,) uint32 of smooth balls, (m, 4) their centres and radii in the
+        stage, at the current frame, and (m,) indices of refraction, 0 for metal."""
+        places = self.images.balls(self.frame)
+        places[:, :3] -= self.origin
+        return (np.array(self.images.round, np.uint32), (places / self.unit).astype(np.float32),
+                self.images.index)
+
     @cached_property
     def appearance(self) -> Appearance:
         """What its materials say of themselves."""

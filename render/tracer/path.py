@@ -4,9 +4,10 @@ Symbols (Veach 1997): beta, throughput of the path so far over its probability; 
 solid angle; `depth`, segments behind the current vertex.
 
 The estimator has the mean of Mitsuba's `path`, and less noise: a vertex may compare several points
-of the lights (`candidates.py`), looks for light through masks and panes (`panes.py`) and in flat
-mirrors (`mirrors.py`), and there is Russian roulette only where paths may have more than `SHORT`
-segments: shorter ones cost little, and all that arrives counts. It differs in what it returns:
+of the lights (`candidates.py`), looks for light through masks and panes (`panes.py`), in flat
+mirrors (`mirrors.py`) and by way of balls (`balls.py`), and there is Russian roulette only where
+paths may have more than `SHORT` segments: shorter ones cost little, and all that arrives counts. It
+differs in what it returns:
 radiance split by the number of scattering events, from one primary hit that the G-buffer shares;
 and what a reflection needs: the part of indirect light whose first direction was sampled from a
 glossy or mirror lobe, and what that path met next. Where a surface has several lobes, that is an
@@ -25,6 +26,7 @@ from onespp.render.mitsuba.images import shape_index
 from onespp.render.mitsuba.variant import mi
 
 from .layers import is_straight
+from .lights.balls import Balls, compared_at, light_by_balls
 from .lights.candidates import sought_light
 from .lights.mirrors import Mirrors, light_in_mirrors
 from .lights.origin import Origin, found_light
@@ -45,6 +47,8 @@ class Radiance:
     specular: the part of `indirect` that left the first hit through a glossy or mirror lobe.
     hit_distance: from the first hit to the next, 0 if there is none. hit_shape: the shape met
     there, its index in the JIT registry, 0 if there is none; hit_face: which of its faces.
+    caustic: the part of `indirect` that comes to the first hit by one ball (`lights/balls.py`),
+    None where there are none.
     straight: the part of all of it that straight paths found (`layers.py`), if that was asked for.
     `unshadowed`, `visibility` and `shadow_ray` are there if direct light was resampled: see
     `render/tracer/lights/resampling.py`.
@@ -57,6 +61,7 @@ class Radiance:
     hit_distance: mi.Float
     hit_shape: mi.UInt32
     hit_face: mi.UInt32
+    caustic: mi.Color3f | None = None
     unshadowed: mi.Color3f | None = None
     visibility: mi.Float | None = None
     shadow_ray: DirectLight | None = None
@@ -68,7 +73,8 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
           max_depth: int, candidates: int = 1, lights: Lights | None = None,
           behind: Replaced | Layer | None = None, tell_straight: bool = False,
           narrow: Callable[[mi.SurfaceInteraction3f], mi.Bool] | None = None,
-          clear: mi.UInt32 | None = None, mirrors: Mirrors | None = None) -> Radiance:
+          clear: mi.UInt32 | None = None, mirrors: Mirrors | None = None,
+          balls: Balls | None = None) -> Radiance:
     """One path a lane.
 
     Args:
@@ -79,7 +85,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         lights: those that direct light at the first hit is resampled from; None: it is by MIS too.
         behind: what `ray` and `pi` are behind, if anything. tell_straight: see `Radiance.straight`.
         narrow: whether a surface is so, as of `resample_lights`. clear: of `MitsubaScene`.
-        mirrors: of the scene as it stands, None where no light is looked for in any.
+        mirrors, balls: of the scene as it stands, None where no light is looked for in any.
     """
     context = mi.BSDFContext()
     o, d, pi = mi.Point3f(ray.o), mi.Vector3f(ray.d), _as_state(pi)
@@ -88,11 +94,12 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     hit_distance, hit_shape, hit_face = mi.Float(0), mi.UInt32(0), mi.UInt32(0)
     straight = mi.Color3f(0) if tell_straight else None
     stays_straight = mi.Bool(True) if tell_straight else None
+    caustic = None if balls is None else mi.Color3f(0)
     arrived = None  # direct light, but for what purely specular lobes reflect
     beta, eta = mi.Color3f(1), mi.Float(1) if max_depth > SHORT else None
     depth, longest, opacity = mi.UInt32(0), max_depth, None
     events = None if clear is None else mi.UInt32(0)  # of scattering, where they are not as many
-    origin = Origin.camera(mirrors)
+    origin = Origin.camera(mirrors, balls, compares=True)
     active = mi.Bool(True)
     if dr.hint(behind is not None, mode="scalar"):
         assert behind is not None
@@ -116,7 +123,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         arrived = mi.Color3f(split.direct)
 
     while dr.hint(active, exclude=[scene, context, lights, longest, opacity, split, behind, narrow,
-                                   clear, mirrors], max_iterations=max_depth, label="path"):
+                                   clear, mirrors, balls], max_iterations=max_depth, label="path"):
         si = pi.compute_surface_interaction(mi.Ray3f(o, d))
         bsdf = si.bsdf()
         order = depth if events is None else events
@@ -126,7 +133,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         if dr.hint(lights is not None, mode="scalar"):
             assert lights is not None
             surer = dr.select((order == 1) & si.is_valid(), lights.emitters, 1)
-        found = beta * found_light(scene, si, origin, surer)
+        found = beta * found_light(scene, si, origin, surer, balls)
 
         # Light that this vertex looks for: one shadow ray.
         inner = si.is_valid() & (depth + 1 < longest)
@@ -136,12 +143,20 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
             arrived += dr.select((order == 1) & ~origin.from_delta, found, 0)
         sought = beta * sought_light(scene, si, sampler, candidates, smooth, clear,
                                      longest - depth - 2)
-        mirrored, seeks = mi.Color3f(0), mi.Bool(False)
-        if dr.hint(mirrors is not None, mode="scalar"):
+        sent, seeks = mi.Color3f(0), mi.Bool(False)
+        if dr.hint(mirrors is not None or balls is not None, mode="scalar"):
             # (Not where some of it would be specular.)
             seeks = inner & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth) & (depth + 2 < longest)
             seeks &= (depth > 0) | ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Glossy)
-            mirrored = beta * light_in_mirrors(scene, si, sampler, mirrors, seeks)
+            if dr.hint(mirrors is not None, mode="scalar"):
+                sent += beta * light_in_mirrors(scene, si, sampler, mirrors, seeks)
+            if dr.hint(balls is not None, mode="scalar"):
+                assert caustic is not None
+                by_ball = beta * light_by_balls(scene, si, sampler, balls, compared_at(depth),
+                                                longest - depth, seeks)
+                sent += by_ball
+                caustic += dr.select(depth == 0, by_ball, 0) + dr.select(
+                    origin.came_by_ball(depth), found, 0)
         lobe = sampler.next_1d()
         if dr.hint(opacity is not None, mode="scalar"):  # of a mask's lobes, the surface's alone
             lobe *= dr.select(depth == 0, opacity, 1)
@@ -152,8 +167,8 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         emission += dr.select(order == 0, found, 0)
         direct += dr.select(order == 1, found, 0) + dr.select(order == 0, sought, 0)
         further = dr.select(order >= 2, found, 0) + dr.select(order >= 1, sought, 0)
-        if dr.hint(mirrors is not None, mode="scalar"):
-            further += mirrored
+        if dr.hint(mirrors is not None or balls is not None, mode="scalar"):
+            further += sent
         indirect += further
         specular += dr.select(through_gloss, further, 0)
 
@@ -169,7 +184,8 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
             straight += dr.select(stays_straight, found, 0)
             stays_straight &= is_straight(bsdf_sample, 1.0 if opacity is None else
                                           dr.select(depth == 0, opacity, 1))
-        origin, is_same = origin.after(si, bsdf_sample, clear, mirrors, seeks, inner)
+        origin, is_same = origin.after(si, bsdf_sample, clear, mirrors, balls, seeks, inner,
+                                       compared_at(depth))
         if dr.hint(events is not None, mode="scalar"):
             assert events is not None
             events += dr.select(is_same, mi.UInt32(0), 1)
@@ -187,7 +203,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         hit_face = dr.select(met, pi.prim_index, hit_face)
 
     radiance = Radiance(emission, direct, indirect, specular, hit_distance, hit_shape, hit_face,
-                        straight=straight)
+                        caustic, straight=straight)
     return _with_split(radiance, arrived, split)
 
 
@@ -195,28 +211,28 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
 def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sobol,
                    start: mi.UInt32, end: mi.UInt32, max_depth: int,
                    candidates: int, clear: mi.UInt32 | None = None,
-                   mirrors: Mirrors | None = None) -> mi.Color3f:
+                   mirrors: Mirrors | None = None, balls: Balls | None = None) -> mi.Color3f:
     """Sum of samples `start` to `end` - 1 of all lanes: the paths of `trace`, radiance alone.
 
     One loop over the vertices of all samples: a lane whose path has ended begins the next from the
     first hit, which is the same for all of them, and waits for no other lane's.
 
     Args:
-        scene, ray, pi, max_depth, candidates, clear, mirrors: as for `trace`.
+        scene, ray, pi, max_depth, candidates, clear, mirrors, balls: as for `trace`.
         sampler: with the lanes' scrambling, at any sample.
     """
     first = pi.compute_surface_interaction(ray)
     total = mi.Float(end - start) * first.emitter(scene).eval(first)
     o, d, pi = mi.Point3f(ray.o), mi.Vector3f(ray.d), _as_state(pi)
     beta, eta, depth = mi.Color3f(0), mi.Float(1), mi.UInt32(0)
-    origin = Origin.camera(mirrors)
+    origin = Origin.camera(mirrors, balls)
     sample, dimension = mi.UInt32(start) - 1, mi.UInt32(0)
     alive = mi.Bool(False)  # on the way to a hit; at the beginning, all have to start
     running = first.is_valid() & (start < end) & (max_depth > 1)
 
-    while dr.hint(running, exclude=[first, end, sampler, clear, mirrors], label="samples"):
+    while dr.hint(running, exclude=[first, end, sampler, clear, mirrors, balls], label="samples"):
         met = pi.compute_surface_interaction(mi.Ray3f(o, d), active=alive)
-        total += dr.select(alive, beta * found_light(scene, met, origin), 0)
+        total += dr.select(alive, beta * found_light(scene, met, origin, balls=balls), 0)
 
         alive &= met.is_valid() & (depth + 1 < max_depth)
         sample += dr.select(alive, mi.UInt32(0), 1)
@@ -231,15 +247,20 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
         total += beta * sought_light(scene, si, numbers, candidates, smooth, clear,
                                      max_depth - depth - 2)
         seeks = mi.Bool(False)
-        if dr.hint(mirrors is not None, mode="scalar"):
+        if dr.hint(mirrors is not None or balls is not None, mode="scalar"):
             seeks = smooth & (depth + 2 < max_depth)
-            total += beta * light_in_mirrors(scene, si, numbers, mirrors, seeks)
+            if dr.hint(mirrors is not None, mode="scalar"):
+                total += beta * light_in_mirrors(scene, si, numbers, mirrors, seeks)
+            if dr.hint(balls is not None, mode="scalar"):
+                total += beta * light_by_balls(scene, si, numbers, balls, mi.UInt32(1),
+                                               max_depth - depth, seeks)
         bsdf_sample, bsdf_weight = bsdf.sample(mi.BSDFContext(), si, numbers.next_1d(),
                                                numbers.next_2d(), running)
         onward = si.spawn_ray(si.to_world(bsdf_sample.wo))
         o, d = onward.o, onward.d
         beta *= bsdf_weight
-        origin, _ = origin.begun(~alive).after(si, bsdf_sample, clear, mirrors, seeks, running)
+        origin, _ = origin.begun(~alive).after(si, bsdf_sample, clear, mirrors, balls, seeks,
+                                               running)
         alive = running & (dr.max(beta) > 0)
         depth += 1
         if dr.hint(max_depth > SHORT, mode="scalar"):

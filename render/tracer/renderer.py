@@ -11,6 +11,7 @@ import drjit as dr
 import numpy as np
 
 from onespp.render.channels import (
+    CAUSTIC,
     FRAME,
     GLOSS,
     GROUPED,
@@ -38,7 +39,7 @@ from .replay import replay
 from .sampler import FRAME_STREAM, REFERENCE_STREAM, Sampler, Sobol, keys_from_seed
 from .view import View
 
-_TRACED = {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS, *PATH}
+_TRACED = {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS, *CAUSTIC, *PATH}
 """Channels that take more than the first hit."""
 
 
@@ -49,7 +50,7 @@ class Renderer(View):
     def channels(self) -> tuple[str, ...]:
         """All channels of its frames that are not the same in any scene of this kind."""
         return (FRAME + (SPLIT + SHADOW if self.splits else ()) + self._grouped
-                + (GLOSS if self.stage.glossy else ())
+                + (GLOSS if self.stage.glossy else ()) + (CAUSTIC if self.balls else ())
                 + (LAYER if self.stage.images.layered else ()))
 
     @property
@@ -78,6 +79,10 @@ class Renderer(View):
             raise InputError(f"the channels {', '.join(c for c in LAYER if c in channels)} need a "
                              "scene with clear glass or masks, which "
                              f"'{self.scene.name}' is not: leave them out")
+        if set(channels) & {*CAUSTIC} and self.balls is None:
+            raise InputError("the channel caustic needs a scene with smooth balls of glass or "
+                             "metal, and without masks and panes, which "
+                             f"'{self.scene.name}' is not: leave it out")
         before = index - 1 if index > 0 else None
         replayed = replay(self, index, before, seed) if set(channels) & set(REPLAY) else {}
         if set(channels) & _TRACED:
@@ -128,7 +133,7 @@ class Renderer(View):
                 radiance = trace(scene, seen, pi, sampler, self.scene.max_depth,
                                  self.candidates, self.lights_now, behind,
                                  narrow=self._narrow, clear=self.stage.clear,
-                                 mirrors=self.mirrors)
+                                 mirrors=self.mirrors, balls=self.balls)
                 if behind and behind.other:
                     radiance = self._with_layers(radiance, behind, sampler)
                 unit = dr.opaque(mi.Float, self.stage.unit)
@@ -140,6 +145,7 @@ class Renderer(View):
                     "unshadowed": radiance.unshadowed,
                     "visibility": radiance.visibility,
                     "specular": radiance.specular,
+                    "caustic": radiance.caustic,
                     "hit_distance": radiance.hit_distance * unit,
                     "hit_id": self.stage.image_id(radiance.hit_shape, radiance.hit_face, row),
                 }
@@ -184,7 +190,7 @@ class Renderer(View):
                                              active=dr.max(layer.throughput) > 0)
         other = trace(scene, layer.ray, pi, sampler, self.scene.max_depth, self.candidates,
                       behind=layer, tell_straight=True, clear=self.stage.clear,
-                      mirrors=self.mirrors)
+                      mirrors=self.mirrors, balls=self.balls)
         assert other.straight is not None
         light = other.emission + other.direct + other.indirect - other.straight
         light = dr.maximum(light, 0)  # (rounding)
@@ -202,18 +208,19 @@ class Renderer(View):
         centre_ray, _ = rays.at(x, y)
         centre_pi = scene.ray_intersect_preliminary(centre_ray, coherent=True)
         sample, end = dr.opaque(mi.UInt32, start), dr.opaque(mi.UInt32, start + count)
-        candidates, clear, mirrors = candidates_for(scene), self.stage.clear, self.mirrors
+        candidates, clear = candidates_for(scene), self.stage.clear
+        mirrors, balls = self.mirrors, self.balls
         if dr.hint(not antialias, mode="scalar"):
             return sum_of_samples(scene, centre_ray, centre_pi, Sobol(keys, pixel, sample), sample,
-                                  end, self.scene.max_depth, candidates, clear, mirrors)
+                                  end, self.scene.max_depth, candidates, clear, mirrors, balls)
         color = mi.Color3f(0)
-        while dr.hint(sample < end, exclude=[scene, rays, clear, mirrors]):
+        while dr.hint(sample < end, exclude=[scene, rays, clear, mirrors, balls]):
             sampler = Sobol(keys, pixel, sample)
             jitter = sampler.next_2d()
             ray, _ = rays.at(x + jitter.x - 0.5, y + jitter.y - 0.5)
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
             radiance = trace(scene, ray, pi, sampler, self.scene.max_depth, candidates=candidates,
-                             clear=clear, mirrors=mirrors)
+                             clear=clear, mirrors=mirrors, balls=balls)
             color += radiance.emission + radiance.direct + radiance.indirect
             sample += 1
         return color

@@ -125,7 +125,7 @@ def _shade(view: View, random_frame: int, seed: int, pixel: mi.UInt32, point: mi
         sampler = view.new_sampler(keys_from_seed(seed, FRAME_STREAM, random_frame), pixel)
         radiance = trace(scene, ray, pi, sampler, view.scene.max_depth,
                          view.candidates, view.lights_now, clear=stage.clear,
-                         mirrors=view.mirrors)
+                         mirrors=view.mirrors, balls=view.balls)
         shaded = _Shaded(mi.luminance(radiance.direct), mi.luminance(radiance.indirect), seen)
     dr.eval(shaded.direct, shaded.indirect, shaded.seen)
     return shaded

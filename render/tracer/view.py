@@ -13,6 +13,7 @@ from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Scene
 
 from .camera_rays import NO_JITTER, Offset, PixelRays, halton, pixel_rays
+from .lights.balls import Balls, find_balls
 from .lights.candidates import candidates_for
 from .lights.mirrors import Mirrors, find_mirrors
 from .lights.resampling import Lights
@@ -77,6 +78,11 @@ class View:
     def mirrors(self) -> Mirrors | None:
         """Those that light is looked for in, at the frame that the stage is set to."""
         return find_mirrors(self.stage)
+
+    @property
+    def balls(self) -> Balls | None:
+        """The same, of balls."""
+        return find_balls(self.stage)
 
     @cached_property
     def _lights_change(self) -> bool:

@@ -7,7 +7,8 @@ how the light has changed, with little noise: history takes a share of it, the g
 what is left (`merging.py`); where it is large against the noise, history is cut short
 (`change.py`). A last filter is for the eye alone and is not fed back (`output.py`).
 All signals go through one pass a level, so that geometry is weighed once; but for glossy light
-where a frame tells of layers (`inputs/layers.py`): it has guides, and so passes, of its own.
+where a frame tells of layers (`inputs/layers.py`): it has guides, and so passes, of its own. Light
+that balls of glass and metal send has edges that no guide tells, and is left to time alone.
 
 Parameters were found by measurement: see `studies/tune.py`.
 """
@@ -65,6 +66,7 @@ from onespp.denoise.methods.parameters import (
     check_range,
     check_whole,
 )
+from onespp.denoise.methods.temporal import Temporal, TemporalState
 from onespp.render.channels import SHADOW
 from onespp.render.frame import Frame
 
@@ -88,9 +90,10 @@ _BACKGROUND_SCALE = 1e3   # of 1/z of background and lamps: only their like coun
 @dataclass(frozen=True)
 class InnovationState(RecordState[Passes]):
     """`RecordState`, that of glossy light where it is of other layers, and what the frame told of
-    its lights; image: of `Surroundings`, smoothed."""
+    its lights; image: of `Surroundings`, smoothed. caustic: of light by way of balls."""
 
     layered: InnovationState | None = None
+    caustic: TemporalState | None = None
     lights: LightSample | None = None
     image: Float | None = field(default=None, repr=False)
 
@@ -267,6 +270,16 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         if away is not None:
             alone = away > 0 if alone is None else alone | (away > 0)
 
+        by_balls, accumulated = None, None
+        if light.caustic is not None:
+            over = Texture(light.texture.albedo)
+            color = Color(*[c - k for c, k in zip(color, over.modulate(light.caustic))])
+            method = Temporal()
+            by_balls, accumulated = method.on_lanes(frame, light.caustic, surface, state.caustic
+                                                    or method.init_on(stencil))
+            by_balls = over.modulate(by_balls)
+        state = replace(state, caustic=accumulated)
+
         def finished(output: list[Signal], own: Surroundings, after: InnovationState) -> Color:
             if own.contact is None:
                 image = light.color(output)
@@ -274,6 +287,8 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
                 assert after.passes is not None
                 image = as_own_rays_say(light, output, color, own,
                                         after.passes.black_lines(color, own.contact))
+            if by_balls is not None:
+                image = Color(*[c + k for c, k in zip(image, by_balls)])
             return _dark_facing_away(image, frame, away, stencil)
 
         if of_gloss is None or SignalKind.GLOSSY not in layout.kinds:

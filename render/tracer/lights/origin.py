@@ -3,7 +3,7 @@
 Weights of multiple importance sampling are of a vertex and a direction. What a path does on its way
 without being turned by chance changes neither: straight on through a mask or a pane (`panes.py`) it
 has left the same vertex in the same direction; by a flat mirror (`mirrors.py`) it has left that
-vertex's image.
+vertex's image; by a ball (`balls.py`) light sampling has a density of its own.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import drjit as dr
 
 from onespp.render.mitsuba.variant import mi
 
+from .balls import Balls
 from .mirrors import Mirrors
 from .panes import goes_through
 from .strata import power_heuristic
@@ -25,9 +26,9 @@ class Origin:
 
     p: the vertex, or its image in a mirror. pdf: the BSDF's density of the direction. from_delta:
     whether no other direction was possible, so that light sampling could not have found it. sought:
-    whether light was looked for in mirrors from there, and the path has met nothing since; None
-    where there are no mirrors. share: by how much densities of light sampling count; None where
-    they always do in full.
+    whether light was looked for in mirrors and balls from there, and the path has met nothing
+    since; None where there are none. share: by how much densities of light sampling count; None
+    where they always do in full. by: a ball that the path has met since; None where there are none.
     """
 
     p: mi.Point3f
@@ -35,55 +36,119 @@ class Origin:
     from_delta: mi.Bool
     sought: mi.Bool | None
     share: mi.Float | None
+    by: Met | None
 
     @staticmethod
-    def camera(mirrors: Mirrors | None) -> Origin:
-        """Of a camera's ray."""
+    def camera(mirrors: Mirrors | None, balls: Balls | None, compares: bool = False) -> Origin:
+        """Of a camera's ray; compares: whether vertices compare points of lights by balls."""
         several = mirrors is not None and mirrors.count > 1
+        none = mirrors is None and balls is None
         return Origin(mi.Point3f(0), mi.Float(1), mi.Bool(True),
-                      None if mirrors is None else mi.Bool(False),
-                      mi.Float(1) if several else None)
+                      None if none else mi.Bool(False), mi.Float(1) if several else None,
+                      None if balls is None else Met.none(compares))
 
     def begun(self, begins: mi.Bool) -> Origin:
         """That of the camera where a path begins."""
         return Origin(self.p, dr.select(begins, 1, self.pdf), self.from_delta | begins,
-                      None if self.sought is None else self.sought & ~begins, self.share)
+                      None if self.sought is None else self.sought & ~begins, self.share,
+                      None if self.by is None else dr.select(
+                          begins, Met.none(self.by.compared is not None), self.by))
+
+    def came_by_ball(self, depth: mi.UInt32) -> mi.Bool:
+        """Whether a path has come from its first vertex by a ball to the one of this depth."""
+        assert self.by is not None
+        return (self.by.ball != 0) & (depth == dr.select(self.by.refracted, mi.UInt32(3), 2))
 
     def after(self, si: mi.SurfaceInteraction3f, sample: mi.BSDFSample3f, clear: mi.UInt32 | None,
-              mirrors: Mirrors | None, seeks: mi.Bool,
-              active: mi.Bool) -> tuple[Origin, mi.Bool]:
+              mirrors: Mirrors | None, balls: Balls | None, seeks: mi.Bool, active: mi.Bool,
+              compared: mi.UInt32 | None = None) -> tuple[Origin, mi.Bool]:
         """Behind a surface, and whether it is the one before it still.
 
         Args:
-            clear: of `MitsubaScene`; mirrors: None where that is not.
-            seeks: whether light was looked for in mirrors from here.
+            clear: of `MitsubaScene`; mirrors, balls: None where that is not.
+            seeks: whether light was looked for in mirrors and balls from here. compared: of
+                `Met`, here.
         """
         is_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
-        p, is_same, sought, share = self.p, mi.Bool(False), None, None
+        p, is_same, sought, share, by = self.p, mi.Bool(False), None, None, None
         if clear is not None:
             is_same = goes_through(sample, si.shape, clear, active)
-        elif mirrors is not None:
-            assert self.sought is not None
-            row = mirrors.row(si.shape, active)
-            is_same = is_delta & self.sought & (row != 0)
-            p, sought = mirrors.image(row - 1, self.p, is_same), seeks & ~is_delta
+        elif self.sought is not None:
+            sought = seeks & ~is_delta
+            if mirrors is not None:
+                row = mirrors.row(si.shape, active)
+                is_same = is_delta & self.sought & (row != 0)
+                p = mirrors.image(row - 1, self.p, is_same)
             if self.share is not None:
+                assert mirrors is not None
                 share = dr.select(is_same, mi.Float(1 / mirrors.count), 1)
+            if balls is not None:
+                assert self.by is not None
+                by = self.by.after(si, sample, balls, self.sought & active, active)
+                is_same |= by.ball != 0
+                if by.compared is not None:
+                    assert compared is not None
+                    by.compared = dr.select(is_same, by.compared, compared)
         return Origin(dr.select(is_same, p, si.p), dr.select(is_same, self.pdf, sample.pdf),
-                      dr.select(is_same, self.from_delta, is_delta), sought, share), is_same
+                      dr.select(is_same, self.from_delta, is_delta), sought, share, by), is_same
+
+
+@dataclass
+class Met:
+    """A ball that a path has met since it left its origin.
+
+    ball: which, from 1; 0: none, or it has met something since. sine: of the angle at which it did.
+    refracted: whether it went in. inside: whether it is there. compared: points of lights that the
+    origin compared; None: one.
+    """
+
+    ball: mi.UInt32
+    sine: mi.Float
+    refracted: mi.Bool
+    inside: mi.Bool
+    compared: mi.UInt32 | None
+
+    @staticmethod
+    def none(compares: bool) -> Met:
+        return Met(mi.UInt32(0), mi.Float(0), mi.Bool(False), mi.Bool(False),
+                   mi.UInt32(1) if compares else None)
+
+    def after(self, si: mi.SurfaceInteraction3f, sample: mi.BSDFSample3f, balls: Balls,
+              sought: mi.Bool, active: mi.Bool) -> Met:
+        """Behind the next surface.
+
+        Args:
+            sought: of the origin, before it.
+        """
+        row, cosine = balls.row(si.shape, active), si.wi.z
+        bounces, passes = (mi.has_flag(sample.sampled_type, flag) for flag in (
+            mi.BSDFFlags.DeltaReflection, mi.BSDFFlags.DeltaTransmission))
+        meets = sought & (row != 0) & (cosine > 0) & (bounces | passes)
+        leaves = active & self.inside & (row == self.ball) & (cosine < 0) & passes
+        sine = dr.sqrt(dr.maximum(1 - dr.square(cosine), 0))
+        return Met(dr.select(meets | leaves, row, 0), dr.select(meets, sine, self.sine),
+                   meets & passes | leaves, meets & passes, self.compared)
 
 
 def found_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, origin: Origin,
-                surer: mi.Float | float = 1.0) -> mi.Color3f:
+                surer: mi.Float | float = 1.0, balls: Balls | None = None) -> mi.Color3f:
     """Radiance of what a direction met, weighed against light sampling.
 
     Args:
         surer: how many times the density of light sampling counts, as of `strata.py`.
     """
-    reference = dr.zeros(mi.Interaction3f)
-    reference.p = origin.p
+    reference, by = dr.zeros(mi.Interaction3f), origin.by
+    reference.p, bent = mi.Point3f(origin.p), mi.Bool(False)
+    if balls is not None:
+        assert by is not None
+        bent = by.ball != 0
+        reference.p = dr.select(bent, balls.place(by.ball - 1, bent)[0], reference.p)
     hit = mi.DirectionSample3f(scene, si, reference)
     emitter_pdf = scene.pdf_emitter_direction(reference, hit, ~origin.from_delta)
     if origin.share is not None:
         surer = surer * origin.share
+    if balls is not None:
+        assert by is not None
+        surer = dr.select(bent, balls.share_of_pdf(origin.p, hit, si, by.ball - 1, by.sine,
+                                                   by.refracted, bent, by.compared), surer)
     return power_heuristic(origin.pdf, surer * emitter_pdf) * hit.emitter.eval(si)

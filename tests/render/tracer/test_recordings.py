@@ -89,7 +89,7 @@ def test_nor_is_the_room_when_its_ceiling_light_moves():
 
 @pytest.mark.parametrize(("name", "paths", "steps"), [
     ("box", 1, [0, 0]), ("hard/mirror", 1, [1, 0]), ("hard/thin-glass", 2, [2, 1]),
-    ("hard/foliage", 2, [2, 1])])
+    ("hard/foliage", 2, [2, 1]), ("hard/glass-ball", 2, [2, 1])])
 def test_no_loop_is_recorded_twice(name, paths, steps, monkeypatch):
     """Dr.Jit records one again if some of its state stays as it is, and all loops in it."""
     counts = []
@@ -103,7 +103,7 @@ def test_no_loop_is_recorded_twice(name, paths, steps, monkeypatch):
     assert [counted.call_count for counted in counts] == [paths, paths, *steps]
 
 
-@pytest.mark.parametrize("name", ["box", "hard/mirror"])
+@pytest.mark.parametrize("name", ["box", "hard/mirror", "hard/glass-ball"])
 def test_nor_is_that_of_a_reference(name, monkeypatch):
     counted = Mock(wraps=path.sought_light)
     monkeypatch.setattr(path, "sought_light", counted)

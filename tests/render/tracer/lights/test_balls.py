@@ -1,0 +1,184 @@
+"""Light by way of smooth balls: the mean of Mitsuba's `path`, without its fireflies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from onespp.render.channels import CAUSTIC, FRAME, GLOSS, SPLIT
+from onespp.render.errors import InputError
+from onespp.render.mitsuba.variant import mi
+from onespp.render.tracer import view
+from onespp.render.tracer.lights.balls import _solved, _Ways
+from onespp.render.tracer.renderer import Renderer
+from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
+from onespp.scenes.materials import diffuse, glass, metal, mirror, pane, varnish
+from onespp.scenes.transforms import look_at, rotate, scale, translate
+from tests.support.path_images import path_images
+from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
+
+X = (1, 0, 0)
+HEIGHT, WIDTH = 16, 24
+ONE_SIDED = {"type": "conductor", "specular_reflectance": {"type": "rgb", "value": [0.9, 0.6, 0.5]}}
+
+
+def ball(name: str, material: dict, x: float, y: float, z: float, radius: float) -> Shape:
+    return Shape(name, Sphere(), material, translate((x, y, z)) @ scale(radius))
+
+
+def scene(*balls: Shape, depth: int = 5, floor: dict | None = None, size: float = 0.4,
+          environment=None) -> Scene:
+    lamp = Shape("lamp", Rectangle(), diffuse((0.0, 0.0, 0.0)),
+                 translate((0.4, 1.8, 0.2)) @ rotate(X, 90) @ scale(size),
+                 (4 / size**2, 3 / size**2, 2 / size**2))
+    ground = Shape("floor", Rectangle(), floor or diffuse((0.7, 0.5, 0.6)),
+                   rotate(X, -90) @ scale(3))
+    return Scene("balls", "for a test", (ground, lamp, *balls),
+                 Camera(look_at((0, 1.2, 3.5), (0, 0.3, 0)), fov=50), 2, WIDTH, HEIGHT,
+                 max_depth=depth, environment=environment)
+
+
+GLASS = ball("glass", glass(), 0.2, 0.55, 0, 0.5)
+ALL = (GLASS, ball("inside", diffuse((0.8, 0.2, 0.2)), 0.3, 0.5, 0.1, 0.1),
+       Shape("moving", Sphere(), glass(1.3),
+             lambda f: translate((-0.8, 0.4 + 0.2 * f, 0.4)) @ scale(0.3)),
+       ball("metal", mirror(), 1.2, 0.4, 0.2, 0.35), ball("tinted", ONE_SIDED, -0.4, 0.2, 1, 0.2))
+
+
+@pytest.mark.parametrize("depth", [3, 4, 7])
+def test_paths_have_the_mean_of_mitsubas_path(depth):
+    renderer = Renderer(scene(*ALL, depth=depth, environment=0.2), HEIGHT, WIDTH)
+    spp, replicates = 64, 16
+    ours = [renderer.sample_sum(1, 0, k, spp, antialias=True) / spp for k in range(replicates)]
+    samples = [renderer.sample_sum(1, 1, k, spp) / spp for k in range(replicates)]
+    theirs = path_images(renderer, 4 * spp, replicates)
+    a, b = ([blocks(image, 8) for image in images] for images in (ours, theirs))
+    assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
+    frames = [renderer.frame(1, k, ("color",))["color"] for k in range(100)]
+    a, b = ([blocks(image, 8) for image in images] for images in (frames, samples))
+    assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
+
+
+@pytest.mark.parametrize("floor", [diffuse((0.7, 0.5, 0.6)), varnish((0.6, 0.3, 0.1), 0.3)])
+def test_every_channel_has_the_mean_that_it_has_without(floor, monkeypatch):
+    def rendered(seed: int) -> list[Mapping[str, np.ndarray]]:
+        renderer = Renderer(scene(*ALL[:4], floor=floor, size=1.5), HEIGHT, WIDTH,
+                            direct="resampled")
+        channels = [c for c in ("direct", "indirect", "specular", "visibility", "emission")
+                    if c in (*FRAME, *SPLIT, *(GLOSS if renderer.stage.glossy else ()))]
+        return [renderer.frame(0, seed + k, channels).images for k in range(120)]
+
+    ours = rendered(0)
+    monkeypatch.setattr(view, "find_balls", lambda stage: None)
+    plain = rendered(1000)
+    for name in ours[0]:
+        a, b = (mean_and_variance([blocks(np.atleast_3d(f[name]), 8) for f in of])
+                for of in (ours, plain))
+        assert_same_mean(*a, *b)
+
+
+@pytest.mark.parametrize(("material", "depth"), [(glass(), 4), (mirror(), 3)])
+def test_a_small_lamp_makes_no_fireflies(material, depth):
+    renderer = Renderer(scene(ball("ball", material, 0.2, 0.9, 0, 0.3), size=0.02, depth=depth),
+                        HEIGHT, WIDTH)
+    frames = np.stack([renderer.frame(0, k, ("caustic",))["caustic"] for k in range(32)])
+    mean, spread = frames.mean(0), frames.std(0)
+    lit = mean[..., 0] > 0.1 * mean[..., 0].max()
+    assert lit.sum() > 3
+    assert (spread[lit] < 0.6 * mean[lit]).mean() > 0.7
+
+
+def test_caustics_are_what_balls_send_to_the_first_hit():
+    """With paths of three segments all indirect light of a floor is reflected by what is on it."""
+    renderer = Renderer(scene(GLASS, ALL[3], depth=3), HEIGHT, WIDTH)
+    assert renderer.balls is not None
+    assert renderer.balls.count == 2
+    frames = [renderer.frame(0, k, ("caustic", "indirect", "id")).images for k in range(20)]
+    for f in frames:
+        floor = f["id"] == renderer.scene.object_names.index("floor")
+        np.testing.assert_allclose(f["caustic"][floor], f["indirect"][floor], atol=1e-6)
+    assert np.mean([f["caustic"] for f in frames]) > 1e-4
+    deeper = Renderer(scene(GLASS, ALL[3]), HEIGHT, WIDTH)
+    for k in range(20):
+        f = deeper.frame(0, k, ("caustic", "indirect")).images
+        assert (f["caustic"] <= f["indirect"] * 1.001 + 1e-6).all()
+        assert (f["caustic"] < f["indirect"]).any()
+
+
+def test_ways_are_all_that_there_are_and_lead_to_the_light():
+    """Of random points around a ball at 0, against roots from a fine scan, in float64."""
+    rng = np.random.default_rng(5)
+    n, index, found = 300, 1.5, 0
+    d1, d2 = 1.01 + 3 * rng.random(n)**2, 1.2 + 4 * rng.random(n)
+    aside = np.pi * rng.random(n)**2
+    u = mi.Vector3f(0, 0, 1)
+    towards = mi.Vector3f(np.sin(aside), np.zeros(n), np.cos(aside))
+    ways = _Ways(mi.Float(1 / d1), mi.Float(1 / d2))
+    solved = _solved(ways, u, towards, mi.Float(index), mi.Bool(True))
+    t, is_way = np.array(solved[0]), np.array(solved[3])
+    grid = np.linspace(0, np.pi / 2, 20001)
+    for i in range(n):
+        outer = np.arcsin(np.sin(grid) / d1[i]) + np.arcsin(np.sin(grid) / d2[i])
+        g = 2 * grid - 2 * np.arcsin(np.sin(grid) / index) - outer
+        for kinds, around, ends in (((0,), g, aside[i]), ((1, 2), g, -aside[i]),
+                                    ((3,), 2 * grid - outer, np.pi - aside[i])):
+            scanned = grid[:-1][np.diff(np.sign(around - ends)) != 0]
+            ours = np.sort([t[k, i] for k in kinds if is_way[k, i]])
+            assert len(ours) == len(scanned)
+            np.testing.assert_allclose(ours, scanned, atol=1e-3)
+            found += len(ours)
+    assert found > 300
+
+
+def test_only_smooth_spheres_that_are_denser_than_around_send_light():
+    others = (Shape("inward", Sphere(flipped=True), glass(), translate((0, 0.5, 0)) @ scale(0.4)),
+              ball("bubble", {"type": "dielectric", "int_ior": 1.0, "ext_ior": 1.4}, 1, 1, 0, 0.3),
+              ball("rough", metal((0.9, 0.6, 0.5), 0.2), -1, 0.5, 0, 0.3),
+              ball("sheet", pane(), -1, 1, 0, 0.2))
+    assert Renderer(scene(*others[:3]), 4, 4).balls is None
+    assert Renderer(scene(), 4, 4).balls is None
+    assert Renderer(scene(GLASS, others[3]), 4, 4).balls is None
+    assert CAUSTIC[0] not in Renderer(scene(*others[:3]), 4, 4).channels
+    assert CAUSTIC[0] in Renderer(scene(GLASS), 4, 4).channels
+
+
+def test_a_scene_without_balls_has_no_caustics():
+    with pytest.raises(InputError, match="caustic needs a scene with smooth balls"):
+        Renderer(scene(), 4, 4).frame(0, 0, ("color", "caustic"))
+
+
+def _traced(alpha: np.ndarray, d1: float, d2: float, index: float) -> tuple[np.ndarray, np.ndarray]:
+    """Where rays from (-d1, 0) at angles to the axis, through a unit disk, meet the circle of
+    radius d2: the angle on it, and the cosine to its normal; by Snell's law, in vectors."""
+    o, d = np.array([-d1 + 0 * alpha, 0 * alpha]), np.array([np.cos(alpha), np.sin(alpha)])
+
+    def met(o, d, radius, far):
+        b = (o * d).sum(0)
+        root = np.sqrt(b**2 - (o * o).sum(0) + radius**2)
+        return o + d * (-b + (root if far else -root))
+
+    def refracted(d, n, ratio):
+        c = -(d * n).sum(0)
+        return ratio * d + (ratio * c - np.sqrt(1 - ratio**2 * (1 - c**2))) * n
+
+    p = met(o, d, 1, far=False)
+    d = refracted(d, p, 1 / index)
+    p = met(p, d, 1, far=True)
+    d = refracted(d, -p, index)
+    p = met(p, d, d2, far=True)
+    return np.unwrap(np.arctan2(p[1], -p[0])), (p * d).sum(0) / d2
+
+
+@pytest.mark.parametrize(("d1", "d2"), [(1.05, 1.3), (3.0, 1.1), (2.0, 6.0)])
+def test_beams_are_spread_as_traced_rays_are(d1, d2):
+    index, t = 1.5, np.array([0.1, 0.4, 0.8, 1.2, 1.45])
+    alpha = np.arcsin(np.sin(t) / d1)
+    (phi, cosine), (more, _), (less, _) = (_traced(alpha + e, d1, d2, index)
+                                           for e in (0, 1e-6, -1e-6))
+    slope = np.abs(more - less) / 2e-6
+    expected = np.sin(alpha) / (np.abs(np.sin(phi)) * slope * cosine)
+    ways = _Ways(mi.Float(1 / d1), mi.Float(1 / d2))
+    ours = ways.spread(mi.Float(np.sin(t)), *ways.turned(mi.Float(t), mi.Float(1 / index)))
+    np.testing.assert_allclose(np.array(ours), expected, rtol=2e-3)
