@@ -26,7 +26,7 @@ from onespp.denoise.catalog import METHODS, build, channels_read
 from onespp.denoise.inputs.signals import USED
 from onespp.denoise.peers.oidn import AVAILABLE
 from onespp.denoise.report.bench_table import print_bench, print_scaling
-from onespp.render.channels import GROUPED, LAYER, REPLAY, SHADOW
+from onespp.render.channels import CAUSTIC, GROUPED, LAYER, REPLAY, SHADOW
 from onespp.render.host import backend
 
 KERNEL_MS, CALL_MS = 4.0, 10.0
@@ -159,7 +159,7 @@ def test_the_probe_has_surfaces_background_and_motion():
 def test_the_textured_probe_has_all_that_methods_read_and_it_agrees(index):
     frame = probe(24, 32, index)
     read = {c for name in METHODS for c in channels_read(build(name), frame.images)}
-    none = {*GROUPED, *LAYER}  # it has one light and no glass
+    none = {*GROUPED, *CAUSTIC, *LAYER}  # it has one light, no balls and no glass
     assert {*USED, *SHADOW, *REPLAY, "albedo", "emission"} - none <= read
     direct = frame["visibility"][..., None] * frame["unshadowed"]
     np.testing.assert_allclose(frame["direct"], direct, rtol=1e-6)

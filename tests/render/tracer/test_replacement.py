@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onespp.render.channels import FRAME, GLOSS, LAYER
+from onespp.render.channels import CAUSTIC, FRAME, GLOSS, LAYER
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Disk, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.hard import HARD
@@ -273,11 +273,12 @@ def test_blends_with_glass_are_met_by_chance():
     assert not Renderer(scene, 8, 8).stage.images.any
 
 
-def test_channels_of_gloss_and_layers_come_with_glass_and_not_with_mirrors():
-    shapes = {"mirror": mirror(), "glass": glass()}
+def test_channels_of_gloss_caustics_and_layers_come_with_what_they_tell_of():
+    shapes = {"mirror": (Rectangle(), mirror()), "pane": (Rectangle(), pane()),
+              "metal ball": (Sphere(), mirror()), "glass ball": (Sphere(), glass())}
     found = {}
-    for name, material in shapes.items():
-        scene = Scene("seen", "for a test", (FLOOR, LAMP, Shape("it", Sphere(), material)), CAMERA,
-                      1, W, H)
+    for name, parts in shapes.items():
+        scene = Scene("seen", "for a test", (FLOOR, LAMP, Shape("it", *parts)), CAMERA, 1, W, H)
         found[name] = Renderer(scene, 8, 8).channels
-    assert found == {"mirror": FRAME, "glass": FRAME + GLOSS + LAYER}
+    assert found == {"mirror": FRAME, "pane": FRAME + GLOSS + LAYER, "metal ball": FRAME + CAUSTIC,
+                     "glass ball": FRAME + GLOSS + CAUSTIC + LAYER}
