@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -182,3 +183,32 @@ def test_beams_are_spread_as_traced_rays_are(d1, d2):
     ways = _Ways(mi.Float(1 / d1), mi.Float(1 / d2))
     ours = ways.spread(mi.Float(np.sin(t)), *ways.turned(mi.Float(t), mi.Float(1 / index)))
     np.testing.assert_allclose(np.array(ours), expected, rtol=2e-3)
+
+
+def _near_lamp() -> Scene:
+    """A lamp at a ball, which it lights from the side; the floor sees it edge on."""
+    lamp = Shape("lamp", Rectangle(), diffuse((0.0, 0.0, 0.0)),
+                 translate((0.1, 1.35, 0)) @ rotate((0, 0, 1), -40) @ rotate(X, 90) @ scale(0.25),
+                 (40.0, 40.0, 40.0))
+    around = scene(GLASS, depth=4)
+    return replace(around, shapes=(around.shapes[0], lamp, GLASS))
+
+
+def _bright_spot() -> Scene:
+    sky = np.full((16, 32, 3), 0.05, np.float32)
+    sky[3:5, 8:11] = 30
+    around = scene(GLASS, depth=4, environment=sky)
+    return replace(around, shapes=(around.shapes[0], GLASS))
+
+
+@pytest.mark.parametrize("lit", [_near_lamp, _bright_spot])
+def test_caustics_of_what_is_near_and_what_is_far_have_the_mean_of_chance(lit, monkeypatch):
+    def rendered(seed: int) -> list[np.ndarray]:
+        renderer = Renderer(lit(), HEIGHT, WIDTH)
+        return [renderer.sample_sum(0, seed, k, 512) / 512 for k in range(12)]
+
+    ours = rendered(0)
+    monkeypatch.setattr(view, "find_balls", lambda stage: None)
+    # (Of the lower half: farther away chance finds too little to tell its variance.)
+    a, b = ([blocks(image[HEIGHT // 2:], 8) for image in images] for images in (ours, rendered(1)))
+    assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
