@@ -23,6 +23,7 @@ from collections.abc import Mapping
 import drjit as dr
 import numpy as np
 
+from onespp.render.host.aligned import aligned
 from onespp.scenes.description import Disk, Mesh, Rectangle, Scene, Shape, Sphere
 
 from .appearance import nested
@@ -120,6 +121,12 @@ class Images:
                 moves += [mirror.moves or (plane is not None and shape.moves) for shape in shapes]
             moves += [False] * len(shapes)
         return tuple(name for name, is_so in zip(self.names(), moves, strict=True) if is_so)
+
+    def numbered(self, shapes: np.ndarray) -> mi.UInt32:
+        """By registry index, which of some shapes it is, from 1; 0: none."""
+        rows = np.zeros(len(self.rows), np.uint32)
+        rows[shapes] = 1 + np.arange(len(shapes))
+        return aligned(mi.UInt32, rows)
 
     def flat_planes(self, frame: float) -> np.ndarray:
         """(n, 2, 3) a point and the unit normal of each of `flat`, world space."""

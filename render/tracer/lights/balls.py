@@ -37,7 +37,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
-import numpy as np
 
 from onespp.render.host.aligned import aligned
 from onespp.render.mitsuba.images import shape_index
@@ -153,10 +152,8 @@ def find_balls(stage: MitsubaScene) -> Balls | None:
     if not stage.images.round or stage.clear is not None:
         return None
     shapes, places, indices = stage.balls()
-    rows = np.zeros(len(stage.images.rows), np.uint32)
-    rows[shapes] = 1 + np.arange(len(shapes))
     return Balls(aligned(mi.UInt32, shapes), aligned(mi.Float, places.ravel()),
-                 aligned(mi.Float, indices), aligned(mi.UInt32, rows), len(shapes))
+                 aligned(mi.Float, indices), stage.images.numbered(shapes), len(shapes))
 
 
 def compared_at(depth: mi.UInt32) -> mi.UInt32:
@@ -195,7 +192,6 @@ def light_by_balls(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sample
         far = mi.has_flag(light.emitter.flags(), mi.EmitterFlags.Infinite)
         ways = _Ways(near, dr.select(far, 0, r / light.dist))
         lit = trying & (light.pdf != 0) & ~light.delta & ways.possible
-        t, g, slope, solved = _solved(ways, u, light.d, index, lit)
         tried += 1
         trying &= tried < compared
 
@@ -205,26 +201,26 @@ def light_by_balls(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sample
         width = dr.norm(across)
         v = dr.select(width > 1e-6, across / width, mi.coordinate_system(u)[0])
         w = width * u - along * v
-        side = mi.Vector4f(-1, 1, 1, 1)
-        sine = dr.sin(t)
+        t, g, slope, solved = _solved(ways, dr.atan2(width, along), index, lit)
+        side, sine = mi.Vector4f(-1, 1, 1, 1), dr.sin(t)
         a, b = sine * near, sine * ways.far
         spread = ways.spread(sine, g, slope)
         cosine = dr.abs(dr.safe_sqrt(1 - dr.square(a)) * dr.dot(n, u) + side * a * dr.dot(n, v))
         facing = dr.safe_sqrt(1 - dr.square(b)) + side * b * (dr.dot(light.n, w)
                                                               / dr.dot(light.n, light.d))
         facing = dr.select(far, 1, facing)
-        through = mi.Vector4f(1, 1, 1, 0) * dr.select((index > 0) & (left > 3), 1, 0)
+        through = dr.select((index > 0) & (left > 3), mi.Float(1), 0)
         mirrored = dr.select(index > 0, _reflectance(sine, dr.rcp(index)), 1)
-        brings = spread * facing * dr.select(through > 0, dr.square(1 - mirrored), mirrored)
+        passed = dr.square(1 - mirrored)
+        brings = spread * facing * mi.Vector4f(passed.x, passed.y, passed.z, mirrored.w)
         share = dr.select(solved & (facing > 0) & dr.isfinite(brings), brings * cosine, 0)
-        share *= dr.select(lit, mi.luminance(weight), 0)
-        share[0], share[1], share[2] = (share[k] * through[k] for k in range(3))
+        share *= (dr.select(lit, mi.luminance(weight), 0)
+                  * mi.Vector4f(through, through, through, 1))
         for k in range(4):
             total += share[k]
             taken, which = offered(which, share[k], total)
             onward = dr.safe_sqrt(1 - dr.square(a[k])) * u + side[k] * a[k] * v
-            arrives = dr.safe_sqrt(1 - dr.square(b[k])) * light.d + side[k] * b[k] * w
-            way = dr.select(taken, _Way(onward, arrives, light.p, far, mi.Bool(k < 3),
+            way = dr.select(taken, _Way(onward, light.d, light.p, far, mi.Bool(k < 3),
                                         weight * (spread[k] * facing[k]),
                                         light.pdf / (spread[k] * facing[k]), share[k]), way)
 
@@ -242,7 +238,7 @@ def light_by_balls(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sample
     passed = dr.select(way.refracted, passed * more * sample.pdf, passed)
     seeks &= there.is_valid() & (dr.max(passed) > 0)
     last = dr.select(way.refracted, out, there)
-    blocked = scene.ray_test(dr.select(way.far, last.spawn_ray(way.arrives),
+    blocked = scene.ray_test(dr.select(way.far, last.spawn_ray(way.toward),
                                        last.spawn_ray_to(way.point)), seeks)
     pdf = way.pdf * compared / balls.count
     brought = value * passed * way.light * (balls.count * power_heuristic(pdf, p))
@@ -253,13 +249,13 @@ def light_by_balls(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sample
 class _Way:
     """From a point by a ball to a light.
 
-    onward: where it leaves to; arrives: where it comes from at `point`, of a light that is `far`.
-    refracted: through the ball. light: radiance over pdf; pdf: over solid angle at the first point.
-    share: by which it was picked.
+    onward: where it leaves to. toward: the direction of the light, if that is `far`; point: else
+    where it is. refracted: through the ball. light: radiance over pdf; pdf: over solid angle at the
+    first point. share: by which it was picked.
     """
 
     onward: mi.Vector3f
-    arrives: mi.Vector3f
+    toward: mi.Vector3f
     point: mi.Point3f
     far: mi.Bool
     refracted: mi.Bool
@@ -274,18 +270,17 @@ class _Way:
 
 
 @dr.syntax
-def _solved(ways: _Ways, u: mi.Vector3f, d: mi.Vector3f, index: mi.Float,
-            active: mi.Bool) -> tuple[mi.Vector4f, mi.Vector4f, mi.Vector4f, Any]:
+def _solved(ways: _Ways, aside: mi.Float, index: mi.Float, active: mi.Bool,
+            ) -> tuple[mi.Vector4f, mi.Vector4f, mi.Vector4f, Any]:
     """Angles of the ways, g and g' (or h and h') there, and which of the ways there are.
 
     Through, crossing the line to the centre; not, the nearer to the rim; not, the other; reflected.
 
     Args:
-        u: from the first point to the centre. d: from there to the second.
+        aside: e.
     """
     inverse = mi.Vector4f(dr.select(index > 0, dr.rcp(index), 0))
     inverse.w = mi.Float(0)
-    aside = dr.atan2(dr.norm(dr.cross(u, d)), dr.dot(u, d))  # e
     sought = mi.Vector4f(aside, -aside, -aside, dr.pi - aside)
     falls = mi.Vector4f(1, 1, -1, 1)
     t = mi.Vector4f(dr.pi / 2, dr.pi / 2, 0, dr.pi / 2)

@@ -29,7 +29,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
-import numpy as np
 
 from onespp.render.host.aligned import aligned
 from onespp.render.mitsuba.images import shape_index
@@ -83,10 +82,8 @@ def find_mirrors(stage: MitsubaScene) -> Mirrors | None:
     if not stage.images.flat or stage.clear is not None:
         return None
     shapes, planes = stage.flat_mirrors()
-    rows = np.zeros(len(stage.images.rows), np.uint32)
-    rows[shapes] = 1 + np.arange(len(shapes))
     return Mirrors(aligned(mi.UInt32, shapes), aligned(mi.Float, planes.ravel()),
-                   aligned(mi.UInt32, rows), len(shapes))
+                   stage.images.numbered(shapes), len(shapes))
 
 
 @dr.syntax

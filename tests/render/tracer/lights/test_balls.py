@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onespp.render.channels import CAUSTIC, FRAME, GLOSS, SPLIT
+from onespp.render.channels import CAUSTIC
 from onespp.render.errors import InputError
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer import view
@@ -17,7 +17,7 @@ from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.materials import diffuse, glass, metal, mirror, pane, varnish
 from onespp.scenes.transforms import look_at, rotate, scale, translate
-from tests.support.path_images import path_images
+from tests.support.path_images import assert_mean_of_path, assert_same_light, light_of_frames
 from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
 
 X = (1, 0, 0)
@@ -51,15 +51,7 @@ ALL = (GLASS, ball("inside", diffuse((0.8, 0.2, 0.2)), 0.3, 0.5, 0.1, 0.1),
 @pytest.mark.parametrize("depth", [3, 4, 7])
 def test_paths_have_the_mean_of_mitsubas_path(depth):
     renderer = Renderer(scene(*ALL, depth=depth, environment=0.2), HEIGHT, WIDTH)
-    spp, replicates = 64, 16
-    ours = [renderer.sample_sum(1, 0, k, spp, antialias=True) / spp for k in range(replicates)]
-    samples = [renderer.sample_sum(1, 1, k, spp) / spp for k in range(replicates)]
-    theirs = path_images(renderer, 4 * spp, replicates)
-    a, b = ([blocks(image, 8) for image in images] for images in (ours, theirs))
-    assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
-    frames = [renderer.frame(1, k, ("color",))["color"] for k in range(100)]
-    a, b = ([blocks(image, 8) for image in images] for images in (frames, samples))
-    assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
+    assert_mean_of_path(renderer, 1)
 
 
 @pytest.mark.parametrize("floor", [diffuse((0.7, 0.5, 0.6)), varnish((0.6, 0.3, 0.1), 0.3)])
@@ -67,17 +59,11 @@ def test_every_channel_has_the_mean_that_it_has_without(floor, monkeypatch):
     def rendered(seed: int) -> list[Mapping[str, np.ndarray]]:
         renderer = Renderer(scene(*ALL[:4], floor=floor, size=1.5), HEIGHT, WIDTH,
                             direct="resampled")
-        channels = [c for c in ("direct", "indirect", "specular", "visibility", "emission")
-                    if c in (*FRAME, *SPLIT, *(GLOSS if renderer.stage.glossy else ()))]
-        return [renderer.frame(0, seed + k, channels).images for k in range(120)]
+        return light_of_frames(renderer, seed, 120)
 
     ours = rendered(0)
     monkeypatch.setattr(view, "find_balls", lambda stage: None)
-    plain = rendered(1000)
-    for name in ours[0]:
-        a, b = (mean_and_variance([blocks(np.atleast_3d(f[name]), 8) for f in of])
-                for of in (ours, plain))
-        assert_same_mean(*a, *b)
+    assert_same_light(ours, rendered(1000))
 
 
 @pytest.mark.parametrize(("material", "depth"), [(glass(), 4), (mirror(), 3)])
@@ -114,10 +100,8 @@ def test_ways_are_all_that_there_are_and_lead_to_the_light():
     n, index, found = 300, 1.5, 0
     d1, d2 = 1.01 + 3 * rng.random(n)**2, 1.2 + 4 * rng.random(n)
     aside = np.pi * rng.random(n)**2
-    u = mi.Vector3f(0, 0, 1)
-    towards = mi.Vector3f(np.sin(aside), np.zeros(n), np.cos(aside))
     ways = _Ways(mi.Float(1 / d1), mi.Float(1 / d2))
-    solved = _solved(ways, u, towards, mi.Float(index), mi.Bool(True))
+    solved = _solved(ways, mi.Float(aside), mi.Float(index), mi.Bool(True))
     t, is_way = np.array(solved[0]), np.array(solved[3])
     grid = np.linspace(0, np.pi / 2, 20001)
     for i in range(n):

@@ -7,14 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from onespp.render.channels import FRAME, GLOSS, SPLIT
 from onespp.render.tracer import view
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Disk, Light, Mesh, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.materials import diffuse, mirror, pane, varnish
 from onespp.scenes.transforms import look_at, rotate, scale, translate
-from tests.support.path_images import path_images
-from tests.support.statistics import assert_same_mean, blocks, mean_and_variance
+from tests.support.path_images import assert_mean_of_path, assert_same_light, light_of_frames
 
 X, Y = (1, 0, 0), (0, 1, 0)
 HEIGHT, WIDTH = 16, 24
@@ -50,15 +48,7 @@ ALL = (Shape("slanted", Rectangle(), mirror(), SLANTED),
 @pytest.mark.parametrize("depth", [3, 6])
 def test_paths_have_the_mean_of_mitsubas_path(depth):
     renderer = Renderer(scene(*ALL, depth=depth, environment=0.1), HEIGHT, WIDTH)
-    spp, replicates = 64, 16
-    ours = [renderer.sample_sum(1, 0, k, spp, antialias=True) / spp for k in range(replicates)]
-    samples = [renderer.sample_sum(1, 1, k, spp) / spp for k in range(replicates)]
-    theirs = path_images(renderer, 4 * spp, replicates)
-    a, b = ([blocks(image, 8) for image in images] for images in (ours, theirs))
-    assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
-    frames = [renderer.frame(1, k, ("color",))["color"] for k in range(100)]
-    a, b = ([blocks(image, 8) for image in images] for images in (frames, samples))
-    assert_same_mean(*mean_and_variance(a), *mean_and_variance(b))
+    assert_mean_of_path(renderer, 1)
 
 
 @pytest.mark.parametrize("floor", [diffuse((0.7, 0.5, 0.6)), varnish((0.6, 0.3, 0.1), 0.3)])
@@ -67,17 +57,11 @@ def test_every_channel_has_the_mean_that_it_has_without(floor, monkeypatch):
     def rendered(seed: int) -> list[Mapping[str, np.ndarray]]:
         renderer = Renderer(scene(*ALL[:3], floor=floor, size=1.0), HEIGHT, WIDTH,
                             direct="resampled")
-        channels = [c for c in ("direct", "indirect", "specular", "visibility", "emission")
-                    if c in (*FRAME, *SPLIT, *(GLOSS if renderer.stage.glossy else ()))]
-        return [renderer.frame(0, seed + k, channels).images for k in range(150)]
+        return light_of_frames(renderer, seed, 150)
 
     ours = rendered(0)
     monkeypatch.setattr(view, "find_mirrors", lambda stage: None)
-    plain = rendered(1000)
-    for name in ours[0]:
-        a, b = (mean_and_variance([blocks(np.atleast_3d(f[name]), 8) for f in of])
-                for of in (ours, plain))
-        assert_same_mean(*a, *b)
+    assert_same_light(ours, rendered(1000))
 
 
 def test_a_small_lamp_in_a_mirror_makes_no_fireflies():
