@@ -90,7 +90,7 @@ class Signals:
         roughness: where G is apart and its lobes are known.
         lobe: the same, but 1 where G is the (diffuse) light of a layer. of_gloss: texture of G,
             where that is known (`layers.py`). is_bare: where L is 0, nothing being diffuse; None
-            where that is not known. caustic: C / a, None where there is none.
+            where that is not known. caustic: C / a, None where there is none; no part of `listed`.
     """
 
     kinds: tuple[SignalKind, ...]
@@ -103,7 +103,7 @@ class Signals:
     lobe: Float | None = None
     of_gloss: Texture = field(default_factory=Texture)
     is_bare: Bool | None = None
-    caustic: Color | None = None
+    caustic: Signal | None = None
 
     @property
     def groups(self) -> int:
@@ -124,6 +124,10 @@ class Signals:
             else:
                 color = _with(color, signal.luminance, next(unshadowed))
         return color
+
+    def by_balls(self, caustic: Signal) -> Color:
+        """The colour of a (filtered) caustic."""
+        return Texture(self.texture.albedo).modulate(_color(caustic))
 
 
 def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
@@ -150,7 +154,7 @@ def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
     if "caustic" in frame:
         sent = Color(*load("caustic"))
         light = Color(*[c - k for c, k in zip(light, sent)])
-        caustic = Texture(texture.albedo).demodulate(sent)
+        caustic = _of_light(Texture(texture.albedo).demodulate(sent))
     kinds, apart, unshadowed, chosen, roughness = [SignalKind.DIFFUSE], [], [], None, None
     texture_of_gloss, lobe, lit, is_bare = Texture(), None, None, None
     if gloss and "specular" in frame:

@@ -32,6 +32,7 @@ from .variant import mi
 _CLEAR = ("SmoothConductor", "SmoothDielectric", "ThinDielectric", "Null")
 _AROUND = ("TwoSidedBRDF", "NormalMap", "BumpMap")
 _STRAIGHT_ON = ("Null", "MaskBSDF", "ThinDielectric")
+_FLAT_SHAPES = ("Rectangle", "Disk")
 _THROUGH = +mi.BSDFFlags.DeltaTransmission | +mi.BSDFFlags.Null
 MOST = 16  # shapes whose images have matrices of their own, the largest ones,
 MOST_IMAGES = 2048  # of objects, in all of them
@@ -45,7 +46,7 @@ class Images:
     Attributes:
         rows: (registry indices) uint32, which row of images is in a shape, from 1; 0: none.
         masks: (registry indices) uint32, 1 for shapes cut out by a mask. clear: the same, for those
-            that let light straight through.
+            that let light straight through. bent: the same, for glass that is no pane.
         flat: registry indices of flat mirrors that nothing but their shape bends. round: of smooth
             spheres, of metal or denser than what is around. index: (round,) of refraction, 0: none.
         in_several: the row of what is seen in one after another. layered: whether anything lets
@@ -81,6 +82,8 @@ class Images:
         self.masks[[i for i, shape in shapes.items() if _is_mask(shape)]] = 1
         self.clear = np.zeros(max(shapes) + 1, np.uint32)
         self.clear[[i for i, shape in shapes.items() if _lets_through(shape.bsdf())]] = 1
+        self.bent = np.zeros(max(shapes) + 1, np.uint32)
+        self.bent[[i for i in found if _is_bent_glass(shapes[i])]] = 1
         self.layered = bool(self.masks.any()) or any(not only_mirrors(shapes[i]) for i in found)
         self.in_several = len(listed) + 1
         self.rows = np.zeros(max(shapes) + 1, np.uint32)
@@ -170,6 +173,21 @@ def is_clear(shape: mi.Shape) -> bool:
 def shape_index(shape: mi.ShapePtr, active: mi.Bool) -> mi.UInt32:
     """Index in the JIT registry, 0 where not `active`."""
     return dr.select(active, dr.reinterpret_array(mi.UInt32, shape), 0)
+
+
+def _is_bent_glass(shape: mi.Shape) -> bool:
+    """Whether a clear surface refracts, and is not flat or of flat faces."""
+    lobes = _lobes(shape)
+    if not lobes & +mi.BSDFFlags.DeltaTransmission or lobes & +mi.BSDFFlags.Null:
+        return False
+    if not shape.is_mesh():
+        return shape.class_name() not in _FLAT_SHAPES
+    if not shape.has_vertex_normals():
+        return False
+    params = mi.traverse(shape)
+    normals = np.asarray(params["vertex_normals"]).reshape(-1, 3)
+    of_faces = normals[np.asarray(params["faces"]).reshape(-1, 3)]
+    return bool(np.ptp(of_faces, axis=1).max(initial=0) > _STRAIGHT)
 
 
 def _lets_through(bsdf: mi.BSDF) -> bool:

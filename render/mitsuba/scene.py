@@ -189,6 +189,11 @@ class MitsubaScene:
         return aligned(mi.UInt32, self.images.masks) if self.images.masks.any() else None
 
     @cached_property
+    def bent_glass(self) -> mi.UInt32 | None:
+        """`bent` of `images`, None if there is none."""
+        return aligned(mi.UInt32, self.images.bent) if self.images.bent.any() else None
+
+    @cached_property
     def clear(self) -> mi.UInt32 | None:
         """Which shapes let light straight through, by registry index; None if none does."""
         return aligned(mi.UInt32, self.images.clear) if self.images.clear.any() else None

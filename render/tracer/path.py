@@ -25,8 +25,8 @@ import drjit as dr
 from onespp.render.mitsuba.images import shape_index
 from onespp.render.mitsuba.variant import mi
 
-from .layers import is_straight
-from .lights.balls import Balls, compared_at, light_by_balls
+from .layers import Course
+from .lights.balls import Balls, light_by_balls
 from .lights.candidates import sought_light
 from .lights.mirrors import Mirrors, light_in_mirrors
 from .lights.origin import Origin, found_light
@@ -74,7 +74,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
           behind: Replaced | Layer | None = None, tell_straight: bool = False,
           narrow: Callable[[mi.SurfaceInteraction3f], mi.Bool] | None = None,
           clear: mi.UInt32 | None = None, mirrors: Mirrors | None = None,
-          balls: Balls | None = None) -> Radiance:
+          balls: Balls | None = None, bent: mi.UInt32 | None = None) -> Radiance:
     """One path a lane.
 
     Args:
@@ -86,6 +86,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         behind: what `ray` and `pi` are behind, if anything. tell_straight: see `Radiance.straight`.
         narrow: whether a surface is so, as of `resample_lights`. clear: of `MitsubaScene`.
         mirrors, balls: of the scene as it stands, None where no light is looked for in any.
+        bent: glass of `MitsubaScene`, in which straight paths may turn; None where there is none.
     """
     context = mi.BSDFContext()
     o, d, pi = mi.Point3f(ray.o), mi.Vector3f(ray.d), _as_state(pi)
@@ -93,7 +94,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     specular, through_gloss = mi.Color3f(0), mi.Bool(False)
     hit_distance, hit_shape, hit_face = mi.Float(0), mi.UInt32(0), mi.UInt32(0)
     straight = mi.Color3f(0) if tell_straight else None
-    stays_straight = mi.Bool(True) if tell_straight else None
+    course = Course.begun(bent) if tell_straight else None
     caustic = None if balls is None else mi.Color3f(0)
     arrived = None  # direct light, but for what purely specular lobes reflect
     beta, eta = mi.Color3f(1), mi.Float(1) if max_depth > SHORT else None
@@ -123,7 +124,8 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         arrived = mi.Color3f(split.direct)
 
     while dr.hint(active, exclude=[scene, context, lights, longest, opacity, split, behind, narrow,
-                                   clear, mirrors, balls], max_iterations=max_depth, label="path"):
+                                   clear, mirrors, balls, bent], max_iterations=max_depth,
+                  label="path"):
         si = pi.compute_surface_interaction(mi.Ray3f(o, d))
         bsdf = si.bsdf()
         order = depth if events is None else events
@@ -152,7 +154,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
                 sent += beta * light_in_mirrors(scene, si, sampler, mirrors, seeks)
             if dr.hint(balls is not None, mode="scalar"):
                 assert caustic is not None
-                by_ball = beta * light_by_balls(scene, si, sampler, balls, compared_at(depth),
+                by_ball = beta * light_by_balls(scene, si, sampler, balls, depth == 0,
                                                 longest - depth, seeks)
                 sent += by_ball
                 caustic += dr.select(depth == 0, by_ball, 0) + dr.select(
@@ -180,12 +182,12 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         through_gloss |= (depth == 0) & (is_delta | is_glossy)
         if dr.hint(tell_straight, mode="scalar"):
             assert straight is not None
-            assert stays_straight is not None
-            straight += dr.select(stays_straight, found, 0)
-            stays_straight &= is_straight(bsdf_sample, 1.0 if opacity is None else
-                                          dr.select(depth == 0, opacity, 1))
+            assert course is not None
+            straight += dr.select(course.is_straight, found, 0)
+            course = course.after(si, bsdf_sample, 1.0 if opacity is None else
+                                  dr.select(depth == 0, opacity, 1), bent)
         origin, is_same = origin.after(si, bsdf_sample, clear, mirrors, balls, seeks, inner,
-                                       compared_at(depth))
+                                       depth == 0)
         if dr.hint(events is not None, mode="scalar"):
             assert events is not None
             events += dr.select(is_same, mi.UInt32(0), 1)
@@ -252,7 +254,7 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
             if dr.hint(mirrors is not None, mode="scalar"):
                 total += beta * light_in_mirrors(scene, si, numbers, mirrors, seeks)
             if dr.hint(balls is not None, mode="scalar"):
-                total += beta * light_by_balls(scene, si, numbers, balls, mi.UInt32(1),
+                total += beta * light_by_balls(scene, si, numbers, balls, mi.Bool(False),
                                                max_depth - depth, seeks)
         bsdf_sample, bsdf_weight = bsdf.sample(mi.BSDFContext(), si, numbers.next_1d(),
                                                numbers.next_2d(), running)

@@ -190,7 +190,7 @@ class Renderer(View):
                                              active=dr.max(layer.throughput) > 0)
         other = trace(scene, layer.ray, pi, sampler, self.scene.max_depth, self.candidates,
                       behind=layer, tell_straight=True, clear=self.stage.clear,
-                      mirrors=self.mirrors, balls=self.balls)
+                      mirrors=self.mirrors, balls=self.balls, bent=self.stage.bent_glass)
         assert other.straight is not None
         light = other.emission + other.direct + other.indirect - other.straight
         light = dr.maximum(light, 0)  # (rounding)

@@ -115,6 +115,7 @@ def replaced(stage: MitsubaScene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3
     """
     scene, max_depth = stage.mi_scene, stage.description.max_depth
     rows, masks, layered = stage.image_rows, stage.masks, stage.images.layered
+    bent = stage.bent_glass
     reflect, through = mi.BSDFContext(), mi.BSDFContext()
     reflect.type_mask, through.type_mask = mi.BSDFFlags.DeltaReflection, _THROUGH
     way, pi = Way.of(ray), mi.PreliminaryIntersection3f(pi)
@@ -127,7 +128,7 @@ def replaced(stage: MitsubaScene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3
         total, picked = mi.Float(0), mi.Float(1)
     active = pi.is_valid() & (max_depth > 1)
 
-    while dr.hint(active, exclude=[stage, rows, masks, reflect, through],
+    while dr.hint(active, exclude=[stage, rows, masks, bent, reflect, through],
                   max_iterations=max_depth, label="images"):
         si = pi.compute_surface_interaction(way.ray, mi.RayFlags.All | mi.RayFlags.dNSdUV, active)
         bsdf = si.bsdf()
@@ -170,7 +171,7 @@ def replaced(stage: MitsubaScene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3
             met = scene.ray_intersect_preliminary(there.ray, coherent=False,
                                                   active=is_one & ~is_hole)
             aside = aside.with_layer(scene, there, dr.select(is_hole, pi, met),
-                                     dr.select(is_hole, o, 1), max_depth, is_one)
+                                     dr.select(is_hole, o, 1), max_depth, is_one, bent)
             wo = dr.select(is_hole, -si.wi, dr.select(passes, beyond.wo, wo))
             weight = dr.select(is_hole, 1 - o, dr.select(passes, share, weight))
             eta = dr.select(passes & ~is_hole, beyond.eta, 1)

@@ -7,8 +7,9 @@ how the light has changed, with little noise: history takes a share of it, the g
 what is left (`merging.py`); where it is large against the noise, history is cut short
 (`change.py`). A last filter is for the eye alone and is not fed back (`output.py`).
 All signals go through one pass a level, so that geometry is weighed once; but for glossy light
-where a frame tells of layers (`inputs/layers.py`): it has guides, and so passes, of its own. Light
-that balls of glass and metal send has edges that no guide tells, and is left to time alone.
+where a frame tells of layers (`inputs/layers.py`): it has guides, and so passes, of its own; and
+for the light that balls of glass and metal send, which has edges that no guide tells: it is
+filtered as what has a texture that is not known (`texture.py`).
 
 Parameters were found by measurement: see `studies/tune.py`.
 """
@@ -66,7 +67,6 @@ from onespp.denoise.methods.parameters import (
     check_range,
     check_whole,
 )
-from onespp.denoise.methods.temporal import Temporal, TemporalState
 from onespp.render.channels import SHADOW
 from onespp.render.frame import Frame
 
@@ -83,6 +83,7 @@ LARGE = 640**2            # pixels of an image whose last filter has a level mor
 _UNDER_MOVING_LIGHTS = 0.9  # `sharp_min_gain`
 _IN_STILL_WORLD = 0.5     # times `min_gain`
 _LIGHTS_AT_REST = 4.0     # times `noise_threshold`, of diffuse light
+_PATTERN_LEVELS = 3, 2    # of light by way of balls: `innovation_levels`, `output_levels`
 _LEAST_SHARE = 1e-4       # that `expected_change` is divided by
 _BACKGROUND_SCALE = 1e3   # of 1/z of background and lamps: only their like counts
 
@@ -93,7 +94,7 @@ class InnovationState(RecordState[Passes]):
     its lights; image: of `Surroundings`, smoothed. caustic: of light by way of balls."""
 
     layered: InnovationState | None = None
-    caustic: TemporalState | None = None
+    caustic: InnovationState | None = None
     lights: LightSample | None = None
     image: Float | None = field(default=None, repr=False)
 
@@ -270,15 +271,15 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         if away is not None:
             alone = away > 0 if alone is None else alone | (away > 0)
 
-        by_balls, accumulated = None, None
+        by_balls, of_caustic = None, None
         if light.caustic is not None:
-            over = Texture(light.texture.albedo)
-            color = Color(*[c - k for c, k in zip(color, over.modulate(light.caustic))])
-            method = Temporal()
-            by_balls, accumulated = method.on_lanes(frame, light.caustic, surface, state.caustic
-                                                    or method.init_on(stencil))
-            by_balls = over.modulate(by_balls)
-        state = replace(state, caustic=accumulated)
+            color = Color(*[c - k for c, k in zip(color, light.by_balls(light.caustic))])
+            (filtered,), _, of_caustic = self._filtered(_Given(
+                frame, _of_pattern(), [light.caustic], None, surface, alone, None, None, None, None,
+                None, None, LightChange()),
+                state.caustic or InnovationState(stencil, no_history(stencil)))
+            by_balls = light.by_balls(filtered)
+        state = replace(state, caustic=of_caustic)
 
         def finished(output: list[Signal], own: Surroundings, after: InnovationState) -> Color:
             if own.contact is None:
@@ -427,6 +428,13 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         return [stencil.opaque(math.sqrt(LOG2E) / sigma)
                 for sigma in layout.each(self.texture_sigma if layout.has_texture
                                          else self.light_sigma, self.visibility_sigma)]
+
+
+def _of_pattern() -> SignalLayout:
+    """Of light by way of balls: a small pattern that no guide tells, as if it were a texture."""
+    innovation, output = _PATTERN_LEVELS
+    return SignalLayout((SignalKind.DIFFUSE,), 0, False, innovation, innovation, output, output,
+                        has_texture=True)
 
 
 def _facing_away(surface: Surface, texture: Texture, stencil: Stencil) -> Float | None:

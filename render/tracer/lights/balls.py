@@ -50,7 +50,8 @@ from .strata import power_heuristic
 _STEPS = 20      # of Newton's method: where two ways are nearly one, each halves the error
 _STILL = 1e-6    # radians
 _SOLVED = 1e-5
-_AT_FIRST = 4    # points of lights that the first vertex of a path compares
+_AT_FIRST = 4    # points of lights that the first vertex of a path compares,
+_CLOSE, _AT_CLOSE = 0.4, 16  # and where it is so close to a ball, as radius over distance
 _SHIFT = (0.7548776662, 0.5698402910)  # from one to the next (R2, Roberts 2018)
 _NEAREST = 1.0001  # distances from a centre, radii
 
@@ -85,23 +86,24 @@ class Balls:
 
     def share_of_pdf(self, x: mi.Point3f, hit: mi.DirectionSample3f, si: mi.SurfaceInteraction3f,
                      ball: mi.UInt32, sine: mi.Float, refracted: mi.Bool, active: mi.Bool,
-                     compared: mi.UInt32 | None) -> mi.Float:
+                     is_first: mi.Bool | None) -> mi.Float:
         """The density over solid angle at x of a direction that went by a ball to a light, over
         that at its centre of the direction from there.
 
         Args:
             hit: the latter. si: where the light was met. sine: of the angle at which the ball was.
-            compared: points of lights, at x; None: one.
+            is_first: whether x is a frame's path's first vertex; None: it is none.
         """
         c, r = self.place(ball, active)
         far = ~si.is_valid()
-        ways = _Ways(r / dr.norm(x - c), dr.select(far, 0, r / dr.norm(si.p - c)))
+        near = r / dr.norm(x - c)
+        ways = _Ways(near, dr.select(far, 0, r / dr.norm(si.p - c)))
         inverse = dr.select(refracted, dr.rcp(self.index(ball, active)), 0)
         spread = ways.spread(sine, *ways.turned(dr.safe_asin(sine), inverse))
         facing = dr.dot(hit.n, si.to_world(si.wi)) / dr.dot(hit.n, hit.d)
         share = 1 / (self.count * spread * dr.select(far, 1, dr.abs(facing)))
-        if compared is not None:
-            share *= compared
+        if is_first is not None:
+            share *= _compared(near, is_first)
         return dr.select(active & ways.possible & dr.isfinite(share), share, 0)
 
 
@@ -156,19 +158,26 @@ def find_balls(stage: MitsubaScene) -> Balls | None:
                  aligned(mi.Float, indices), stage.images.numbered(shapes), len(shapes))
 
 
-def compared_at(depth: mi.UInt32) -> mi.UInt32:
-    """How many points of lights a vertex of a frame's path compares; of a reference's it is one,
-    whose lanes are at vertices of all depths and would wait for those at first ones."""
-    return dr.select(depth == 0, mi.UInt32(_AT_FIRST), 1)
+def _compared(near: mi.Float, is_first: mi.Bool) -> mi.UInt32:
+    """How many points of lights a vertex compares: most where a ball is so close that its light
+    comes from a small part of a lamp, one where the path has had another vertex.
+
+    Args:
+        near: radius of the ball over the distance of its centre.
+    """
+    at_first = dr.select(near > _CLOSE, mi.UInt32(_AT_CLOSE), _AT_FIRST)
+    return dr.select(is_first, at_first, 1)
 
 
 @dr.syntax
 def light_by_balls(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler, balls: Any,
-                   compared: mi.UInt32, left: mi.UInt32, active: mi.Bool) -> mi.Color3f:
+                   is_first: mi.Bool, left: mi.UInt32, active: mi.Bool) -> mi.Color3f:
     """Radiance toward `si.wi` of light that one ball sends there; three rays, one after another.
 
     Args:
-        compared: points of lights. left: segments that the path may still have.
+        is_first: whether it is the first vertex of a frame's path. (A reference's compares one
+            point, as its lanes are at vertices of all depths and would wait for the first ones.)
+        left: segments that the path may still have.
     """
     context = mi.BSDFContext()
     ball = dr.minimum(mi.UInt32(sampler.next_1d() * balls.count), balls.count - 1)
@@ -178,6 +187,7 @@ def light_by_balls(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sample
     centre.p, centre.time, centre.wavelengths = c, si.time, si.wavelengths
     to_centre = c - si.p
     near = r / dr.norm(to_centre)
+    compared = _compared(near, is_first)
     u = dr.normalize(to_centre)
     drawn, which, n = sampler.next_2d(), sampler.next_1d(), mi.Vector3f(si.n)
 

@@ -52,7 +52,7 @@ class Origin:
         return Origin(self.p, dr.select(begins, 1, self.pdf), self.from_delta | begins,
                       None if self.sought is None else self.sought & ~begins, self.share,
                       None if self.by is None else dr.select(
-                          begins, Met.none(self.by.compared is not None), self.by))
+                          begins, Met.none(self.by.is_first is not None), self.by))
 
     def came_by_ball(self, depth: mi.UInt32) -> mi.Bool:
         """Whether a path has come from its first vertex by a ball to the one of this depth."""
@@ -61,12 +61,12 @@ class Origin:
 
     def after(self, si: mi.SurfaceInteraction3f, sample: mi.BSDFSample3f, clear: mi.UInt32 | None,
               mirrors: Mirrors | None, balls: Balls | None, seeks: mi.Bool, active: mi.Bool,
-              compared: mi.UInt32 | None = None) -> tuple[Origin, mi.Bool]:
+              is_first: mi.Bool | None = None) -> tuple[Origin, mi.Bool]:
         """Behind a surface, and whether it is the one before it still.
 
         Args:
             clear: of `MitsubaScene`; mirrors, balls: None where that is not.
-            seeks: whether light was looked for in mirrors and balls from here. compared: of
+            seeks: whether light was looked for in mirrors and balls from here. is_first: of
                 `Met`, here.
         """
         is_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
@@ -86,9 +86,9 @@ class Origin:
                 assert self.by is not None
                 by = self.by.after(si, sample, balls, self.sought & active, active)
                 is_same |= by.ball != 0
-                if by.compared is not None:
-                    assert compared is not None
-                    by.compared = dr.select(is_same, by.compared, compared)
+                if by.is_first is not None:
+                    assert is_first is not None
+                    by.is_first = dr.select(is_same, by.is_first, is_first)
         return Origin(dr.select(is_same, p, si.p), dr.select(is_same, self.pdf, sample.pdf),
                       dr.select(is_same, self.from_delta, is_delta), sought, share, by), is_same
 
@@ -98,20 +98,20 @@ class Met:
     """A ball that a path has met since it left its origin.
 
     ball: which, from 1; 0: none, or it has met something since. sine: of the angle at which it did.
-    refracted: whether it went in. inside: whether it is there. compared: points of lights that the
-    origin compared; None: one.
+    refracted: whether it went in. inside: whether it is there. is_first: whether the
+    origin is the first vertex of a frame's path; None: it is none.
     """
 
     ball: mi.UInt32
     sine: mi.Float
     refracted: mi.Bool
     inside: mi.Bool
-    compared: mi.UInt32 | None
+    is_first: mi.Bool | None
 
     @staticmethod
     def none(compares: bool) -> Met:
         return Met(mi.UInt32(0), mi.Float(0), mi.Bool(False), mi.Bool(False),
-                   mi.UInt32(1) if compares else None)
+                   mi.Bool(False) if compares else None)
 
     def after(self, si: mi.SurfaceInteraction3f, sample: mi.BSDFSample3f, balls: Balls,
               sought: mi.Bool, active: mi.Bool) -> Met:
@@ -127,7 +127,7 @@ class Met:
         leaves = active & self.inside & (row == self.ball) & (cosine < 0) & passes
         sine = dr.sqrt(dr.maximum(1 - dr.square(cosine), 0))
         return Met(dr.select(meets | leaves, row, 0), dr.select(meets, sine, self.sine),
-                   meets & passes | leaves, meets & passes, self.compared)
+                   meets & passes | leaves, meets & passes, self.is_first)
 
 
 def found_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, origin: Origin,
@@ -150,5 +150,5 @@ def found_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, origin: Origin,
     if balls is not None:
         assert by is not None
         surer = dr.select(bent, balls.share_of_pdf(origin.p, hit, si, by.ball - 1, by.sine,
-                                                   by.refracted, bent, by.compared), surer)
+                                                   by.refracted, bent, by.is_first), surer)
     return power_heuristic(origin.pdf, surer * emitter_pdf) * hit.emitter.eval(si)

@@ -15,7 +15,6 @@ from onespp.denoise.jit.grid import Stencil
 from onespp.denoise.methods import base as lanes
 from onespp.denoise.methods.filtered_innovation import method as innovation
 from onespp.denoise.methods.filtered_innovation.method import FilteredInnovation
-from onespp.denoise.methods.temporal import Temporal
 from onespp.denoise.oracles import filtered_innovation as innovation_oracle
 from onespp.render.errors import InputError
 from tests.support.frames import make_frame, noisy, translation, with_images
@@ -411,20 +410,24 @@ def test_a_shadow_that_is_there_at_once_is_seen_at_once():
     assert np.abs(late - expected)[:, 15:24].max() > 0.05
 
 
-def test_light_by_balls_is_left_to_time_alone():
-    """What the method makes of the rest, and `temporal` of that light over albedo."""
+def test_light_by_balls_is_filtered_as_a_texture():
+    """What the method makes of the rest, and of that light over albedo as of plain frames."""
     rng = np.random.default_rng(8)
     frames, rest, light, albedo = split(24, 32, lobes=False), [], [], []
     for i, frame in enumerate(frames):
         seen = (frame["id"] >= 0)[..., None]
         sent = (seen * rng.gamma(0.5, 1.0, (24, 32, 1)) * [0.3, 0.2, 0.1]).astype(np.float32)
+        frame = with_images(frame, albedo=np.maximum(frame["albedo"], np.float32(0.1)))
         rest.append(frame)
         frames[i] = with_images(frame, caustic=sent, indirect=frame["indirect"] + sent,
                                 color=frame["color"] + sent)
         albedo.append(np.where(frame["albedo"] > 0, frame["albedo"], 1))
-        light.append(with_images(frame, color=sent / albedo[-1]))
+        plain = ("normal", "position", "depth", "id")
+        light.append(replace(frame, images={"color": sent / albedo[-1],
+                                            **{name: frame[name] for name in plain}}))
     image, _ = run(FilteredInnovation(), frames)
-    expected = run(FilteredInnovation(), rest)[0] + albedo[-1] * run(Temporal(), light)[0]
+    of_pattern = FilteredInnovation(innovation_levels=3, output_levels=2, sharp_output_levels=2)
+    expected = run(FilteredInnovation(), rest)[0] + albedo[-1] * run(of_pattern, light)[0]
     np.testing.assert_allclose(image, expected, rtol=2e-4, atol=2e-5)
     assert np.abs(image - run(FilteredInnovation(), [
         replace(f, images={k: v for k, v in f.images.items() if k != "caustic"})

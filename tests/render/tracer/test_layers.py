@@ -10,7 +10,7 @@ import pytest
 from onespp.render.channels import FRAME, GLOSS, LAYER
 from onespp.render.errors import InputError
 from onespp.render.tracer.renderer import Renderer
-from onespp.scenes.description import Camera, Disk, Rectangle, Scene, Shape, Sphere
+from onespp.scenes.description import Camera, Disk, Mesh, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.materials import diffuse, glass, pane
 from onespp.scenes.meshes import box
 from onespp.scenes.transforms import look_at, rotate, scale, translate
@@ -23,6 +23,12 @@ WALL = Shape("wall", Rectangle(), diffuse((0.5, 0.5, 0.5)), translate((0, 0, -3)
 CAMERA = Camera(look_at((0, 0, 4), (0, 0, 0)), fov=2)
 r = ((1.5 / 1.000277 - 1) / (1.5 / 1.000277 + 1)) ** 2  # of one side, along the normal
 SHEET = 2 * r / (1 + r)  # of both, one after another
+
+
+def round_box() -> Mesh:
+    """A cube that is shaded as if it were a ball."""
+    cube = box((1, 1, 1))
+    return replace(cube, normals=cube.vertices / np.linalg.norm(cube.vertices, axis=1)[:, None])
 
 
 def through(*shapes: Shape, size: int = 9, **more) -> Renderer:
@@ -99,6 +105,62 @@ def test_lamps_have_no_noise_and_the_mean_of_what_samples_find_of_them():
     truth = mean_and_variance([blocks(renderer.sample_sum(0, 7, part, 64) / 64, 6)
                                for part in range(24)])
     assert_same_mean(mean, variance, *truth)
+
+
+def shares_of_a_ball(renderer: Renderer, index: float) -> tuple[np.ndarray, np.ndarray]:
+    """Of a unit ball in the middle: where it is, and what each of its surfaces reflects there."""
+    size = renderer.height
+    x = (2 * (np.arange(size) + 0.5) / size - 1) * np.tan(
+        np.radians(renderer.scene.camera.fov / 2))
+    slope = np.hypot(*np.meshgrid(x, x))
+    sine = 4 * slope / np.sqrt(1 + slope**2)
+    is_ball = sine < 1
+    outside, inside = (np.sqrt(1 - np.where(is_ball, s, 0)**2) for s in (sine, sine / index))
+    reflected = 0.5 * (((index * outside - inside) / (index * outside + inside))**2
+                       + ((outside - index * inside) / (outside + index * inside))**2)
+    return is_ball, reflected
+
+
+@pytest.fixture(scope="module")
+def ball_under_a_sky():
+    scene = Scene("ball", "for a test", (Shape("ball", Sphere(), glass()),),
+                  replace(CAMERA, fov=29), 1, 32, 32, 12, environment=1.0)
+    return Renderer(scene, 32, 32, direct="resampled", sampler="zsobol")
+
+
+def test_a_ball_shows_the_sky_by_three_reflections_inside(ball_under_a_sky):
+    """One more than turns where light goes on through it and the layer begins behind the first."""
+    renderer = ball_under_a_sky
+    is_ball, r = shares_of_a_ball(renderer, 1.5 / 1.000277)
+    emission = renderer.frame(0, 0, ("emission",))["emission"]
+    told = r + (1 - r)**2 * (1 + r + r**2 + r**3)
+    tried = is_ball & (r > 0.1) & (r < 0.25)
+    assert tried.sum() > 50
+    np.testing.assert_allclose(emission[tried], np.repeat(told[tried, None], 3, 1), rtol=2e-4)
+    np.testing.assert_allclose(emission[~is_ball], 1, rtol=1e-6)
+
+
+def test_and_what_chance_finds_beyond_makes_it_whole(ball_under_a_sky):
+    """It is as bright as the sky, at the rim too: what is told is not found once more."""
+    renderer = ball_under_a_sky
+    is_ball, r = shares_of_a_ball(renderer, 1.5 / 1.000277)
+    rings = [is_ball & (r >= low) & (r < low + 0.2) for low in (0, 0.2, 0.4)]
+
+    def in_rings(image: np.ndarray) -> np.ndarray:
+        return np.array([image[ring].mean() for ring in rings])
+
+    mean, variance = mean_and_variance(
+        [in_rings(renderer.frame(0, seed, ("color",))["color"]) for seed in range(256)])
+    inside = renderer.scene.max_depth - 2  # segments: paths leave out what is reflected more often
+    assert_same_mean(mean, variance, in_rings(1 - (1 - r) * r**inside))
+
+
+@pytest.mark.parametrize(("form", "material", "is_so"), [
+    (Sphere(), glass(), True), (Sphere(), pane(), False), (Disk(), glass(), False),
+    (box((1, 1, 1)), glass(), False), (round_box(), glass(), True)])
+def test_glass_is_bent_where_normals_of_a_face_differ(form, material, is_so):
+    stage = through(Shape("it", form, material), environment=1.0).stage
+    assert (stage.bent_glass is not None) == is_so
 
 
 def test_scenes_without_such_surfaces_have_no_layers():
