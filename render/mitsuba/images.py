@@ -180,8 +180,10 @@ def _is_bent_glass(shape: mi.Shape) -> bool:
     lobes = _lobes(shape)
     if not lobes & +mi.BSDFFlags.DeltaTransmission or lobes & +mi.BSDFFlags.Null:
         return False
+    if shape.class_name() in _FLAT_SHAPES:  # (a rectangle says that it is a mesh)
+        return False
     if not shape.is_mesh():
-        return shape.class_name() not in _FLAT_SHAPES
+        return True
     if not shape.has_vertex_normals():
         return False
     params = mi.traverse(shape)

@@ -75,7 +75,7 @@ class Course:
 
     def after(self, si: mi.SurfaceInteraction3f, sample: mi.BSDFSample3f,
               opacity: mi.Float | float, bent: mi.UInt32 | None) -> Course:
-        """Behind the next surface; arguments as of `_is_onward` and `_may_turn`."""
+        """Behind the next surface; opacity: as of `_is_onward`; bent: as for `begun`."""
         goes_on, turns = _is_onward(sample, opacity), self.turns
         if turns is not None:
             assert bent is not None
@@ -96,7 +96,7 @@ def _is_onward(sample: mi.BSDFSample3f, opacity: mi.Float | float) -> mi.Bool:
 
 
 def _may_turn(si: mi.SurfaceInteraction3f, bent: mi.UInt32, active: mi.Bool) -> mi.Bool:
-    """Whether light is inside of bent glass there, and either goes out or is reflected back."""
+    """Whether light is inside of bent glass there, and goes out or is reflected back."""
     inside = active & (si.wi.z < 0)
     return inside & (dr.gather(mi.UInt32, bent, shape_index(si.shape, inside), inside) != 0)
 
@@ -121,8 +121,8 @@ def _followed(scene: mi.Scene, way: Way, pi: mi.PreliminaryIntersection3f, opaci
     """The end of a layer, and the light that its surfaces emit.
 
     Args:
-        way, pi: its first segment, and what that meets. opacity: as of `Layer`. bent: as of
-            `may_turn`; None where there is none. turns: how many it may take.
+        way, pi: its first segment, and what that meets. opacity: as of `Layer`. bent: of
+            `MitsubaScene.bent_glass`. turns: how many it may take.
     """
     lamps, context = mi.Color3f(0), mi.BSDFContext()
     way, pi, left = dr.copy(way), mi.PreliminaryIntersection3f(pi), mi.Float(opacity)

@@ -157,7 +157,8 @@ def test_and_what_chance_finds_beyond_makes_it_whole(ball_under_a_sky):
 
 @pytest.mark.parametrize(("form", "material", "is_so"), [
     (Sphere(), glass(), True), (Sphere(), pane(), False), (Disk(), glass(), False),
-    (box((1, 1, 1)), glass(), False), (round_box(), glass(), True)])
+    (Rectangle(), glass(), False), (box((1, 1, 1)), glass(), False),
+    (round_box(), glass(), True)])
 def test_glass_is_bent_where_normals_of_a_face_differ(form, material, is_so):
     stage = through(Shape("it", form, material), environment=1.0).stage
     assert (stage.bent_glass is not None) == is_so
