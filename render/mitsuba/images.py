@@ -78,12 +78,12 @@ class Images:
         round_ = [(index, ball, eta) for index, ball, eta in round_ if eta is not None]
         self.round, self._round = [i for i, *_ in round_], [ball for _, ball, _ in round_]
         self.index = np.array([eta for *_, eta in round_], np.float32)
-        self.masks = np.zeros(max(shapes) + 1, np.uint32)
-        self.masks[[i for i, shape in shapes.items() if _is_mask(shape)]] = 1
-        self.clear = np.zeros(max(shapes) + 1, np.uint32)
-        self.clear[[i for i, shape in shapes.items() if _lets_through(shape.bsdf())]] = 1
-        self.bent = np.zeros(max(shapes) + 1, np.uint32)
-        self.bent[[i for i in found if _is_bent_glass(shapes[i])]] = 1
+        indices = np.arange(max(shapes) + 1)
+        self.masks, self.clear, self.bent = (
+            np.isin(indices, those).astype(np.uint32) for those in (
+                [i for i, shape in shapes.items() if _is_mask(shape)],
+                [i for i, shape in shapes.items() if _lets_through(shape.bsdf())],
+                [i for i in found if _is_bent_glass(shapes[i])]))
         self.layered = bool(self.masks.any()) or any(not only_mirrors(shapes[i]) for i in found)
         self.in_several = len(listed) + 1
         self.rows = np.zeros(max(shapes) + 1, np.uint32)

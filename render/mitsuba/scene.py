@@ -186,17 +186,17 @@ class MitsubaScene:
     @cached_property
     def masks(self) -> mi.UInt32 | None:
         """Which shapes are cut out by masks, by registry index; None if none is."""
-        return aligned(mi.UInt32, self.images.masks) if self.images.masks.any() else None
+        return _where_any(self.images.masks)
 
     @cached_property
     def bent_glass(self) -> mi.UInt32 | None:
         """`bent` of `images`, None if there is none."""
-        return aligned(mi.UInt32, self.images.bent) if self.images.bent.any() else None
+        return _where_any(self.images.bent)
 
     @cached_property
     def clear(self) -> mi.UInt32 | None:
         """Which shapes let light straight through, by registry index; None if none does."""
-        return aligned(mi.UInt32, self.images.clear) if self.images.clear.any() else None
+        return _where_any(self.images.clear)
 
     def flat_mirrors(self) -> tuple[np.ndarray, np.ndarray]:
         """Registry indices (m,) uint32 of flat mirrors, and (m, 4) their planes (n, d), n . x = d
@@ -348,6 +348,11 @@ class MitsubaScene:
                 faces.append(np.full(count, number[shape.name], np.uint32))
                 start += count
         return aligned(mi.UInt32, table), aligned(mi.UInt32, np.concatenate(faces))
+
+
+def _where_any(marks: np.ndarray) -> mi.UInt32 | None:
+    """Marks of shapes by registry index, None where none is marked."""
+    return aligned(mi.UInt32, marks) if marks.any() else None
 
 
 def _registry_index(shape: Any) -> int:

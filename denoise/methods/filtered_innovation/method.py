@@ -111,16 +111,16 @@ class _Given(NamedTuple):
     frame: Frame
     layout: SignalLayout
     signals: list[Signal]
-    chosen: Chosen | None
     surface: Surface
     alone: Bool | None
-    lit: Float | None
-    rays: ShadowRays | None
-    hits: Hits | None
-    roughness: Float | None
-    lobe: Float | None
-    bare_lobe: Float | None
-    change: LightChange
+    change: LightChange = LightChange()
+    chosen: Chosen | None = None
+    lit: Float | None = None
+    rays: ShadowRays | None = None
+    hits: Hits | None = None
+    roughness: Float | None = None
+    lobe: Float | None = None
+    bare_lobe: Float | None = None
 
 
 @dataclass(frozen=True)
@@ -274,10 +274,9 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
         by_balls, of_caustic = None, None
         if light.caustic is not None:
             color = Color(*[c - k for c, k in zip(color, light.by_balls(light.caustic))])
-            (filtered,), _, of_caustic = self._filtered(_Given(
-                frame, _of_pattern(), [light.caustic], None, surface, alone, None, None, None, None,
-                None, None, LightChange()),
-                state.caustic or InnovationState(stencil, no_history(stencil)))
+            (filtered,), _, of_caustic = self._filtered(
+                _Given(frame, _of_pattern(), [light.caustic], surface, alone),
+                state.caustic or self.init_on(stencil))
             by_balls = light.by_balls(filtered)
         state = replace(state, caustic=of_caustic)
 
@@ -294,19 +293,18 @@ class FilteredInnovation(OnLanes["RecordState[Passes]"]):
 
         if of_gloss is None or SignalKind.GLOSSY not in layout.kinds:
             output, own, after = self._filtered(_Given(
-                frame, layout, light.listed, light.chosen, surface, alone, light.lit, rays,
-                hits, light.roughness, light.lobe, bare_lobe, change), state)
+                frame, layout, light.listed, surface, alone, change, light.chosen, light.lit, rays,
+                hits, light.roughness, light.lobe, bare_lobe), state)
             return finished(output, own, after), replace(after, layered=None, lights=lights)
         signals, glossy = list(light.listed), layout.kinds.index(SignalKind.GLOSSY)
         rest, only_gloss = layout.without_gloss()
         (gloss,), _, layered = self._filtered(_Given(
-            of_gloss, only_gloss, [signals.pop(glossy)], None, read_surface(of_gloss, stencil),
-            read_texture(of_gloss, stencil, self.demodulate).zero_albedo, None, None, hits,
-            light.roughness, light.lobe, None, change),
-            state.layered or InnovationState(stencil, no_history(stencil)))
+            of_gloss, only_gloss, [signals.pop(glossy)], read_surface(of_gloss, stencil),
+            read_texture(of_gloss, stencil, self.demodulate).zero_albedo, change, hits=hits,
+            roughness=light.roughness, lobe=light.lobe), state.layered or self.init_on(stencil))
         output, own, after = self._filtered(_Given(
-            frame, rest, signals, light.chosen, surface, alone, light.lit, rays, hits,
-            None, None, None, change), state)
+            frame, rest, signals, surface, alone, change, light.chosen, light.lit, rays, hits),
+            state)
         output.insert(glossy, gloss)
         return finished(output, own, after), replace(after, layered=layered, lights=lights)
 
