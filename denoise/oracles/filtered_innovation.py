@@ -607,7 +607,15 @@ def without_peaks(frame: Frame, image: np.ndarray, least: np.ndarray, most: Any,
     before, after = np.moveaxis(smooth(frame, np.stack([x, x * share], -1), np.ones(x.shape),
                                        levels, m), -1, 0)
     factor = np.where(after > 0, np.clip(before / np.where(after > 0, after, 1), 1, 6), 1)
-    return image * share[..., None], factor
+    return scaled(image, share), factor
+
+
+def scaled(image: np.ndarray, factor: np.ndarray) -> np.ndarray:
+    """Light times a factor, but for what makes components negative at the same luminance."""
+    x, least = np.maximum(lum(image), 0)[..., None], np.minimum(image.min(-1), 0)[..., None]
+    grey = np.where(x - least > 0, -least / np.maximum(x - least, 1e-30), 0)
+    light = (1 - grey) * image + grey * x
+    return image + (factor[..., None] - 1) * light
 
 
 def run(frames: list[Frame], m) -> np.ndarray:
@@ -752,8 +760,9 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
                 twice = np.where(found, np.minimum(lum(d), lum(d - e)), 0)
                 twice = np.where(roughness_of(frame) < 0.2, twice, 1e36)
                 trimmed, factor = without_peaks(frame, d, 3 * twice, 4, m.innovation_levels, m)
-                e = np.where(found[..., None], e + trimmed * factor[..., None] - d, 0)
-                d = signals[name] = trimmed * factor[..., None]
+                whole = scaled(trimmed, factor)
+                e = np.where(found[..., None], e + whole - d, 0)
+                d = signals[name] = whole
                 spatial = spatial_variance(frame, d, m)
             if previous is not None:
                 energy = smooth(frame, lum(e)[..., None] ** 2, found, 2, m)[..., 0]
@@ -864,11 +873,11 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
                 most = 2.5 if name == "L" else 1.5 + 10 * bent
                 before, factor = without_peaks(frame, history, 0.75 * twice, most, wide, m)
             fade = np.ones(found.shape) if name == "G" else fade
-            out[name] = guided(frame, before, s2, levels, sigmas, fade, narrow, m,
-                               np.clip(samples, 1e-5, 1) if sparse else None,
-                               {"L": 0.2, "G": 1.0}.get(name, 0),
-                               int(name == "L" and has_peaks and m.output_levels
-                                   < m.innovation_levels), bends) * factor[..., None]
+            out[name] = scaled(guided(frame, before, s2, levels, sigmas, fade, narrow, m,
+                                      np.clip(samples, 1e-5, 1) if sparse else None,
+                                      {"L": 0.2, "G": 1.0}.get(name, 0),
+                                      int(name == "L" and has_peaks and m.output_levels
+                                          < m.innovation_levels), bends), factor)
             if sparse:
                 history = np.where(samples[..., None] > 1e-5, history, out[name])
             kept[name] = history, s2, np.minimum(samples, 64)

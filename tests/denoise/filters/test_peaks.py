@@ -15,6 +15,7 @@ from onespp.denoise.filters.peaks import (
 )
 from onespp.denoise.inputs.signals import Signal, SignalKind
 from onespp.denoise.jit.arrays import Color
+from onespp.denoise.jit.color import LUMINANCE
 from onespp.denoise.jit.grid import Stencil, single
 from onespp.denoise.jit.taps import window
 
@@ -88,3 +89,25 @@ def test_what_was_taken_comes_back_where_light_is():
     (whole,) = with_their_light([light], around)
     assert whole.red is not None
     np.testing.assert_allclose(whole.red.numpy(), [3, 2, 12, 2], rtol=1e-6)
+
+
+def without_negative(color: np.ndarray) -> np.ndarray:
+    """Of the luminance of `color`, on the way from it to grey."""
+    grey = np.full(3, color @ LUMINANCE)
+    for way in np.linspace(1, 0, 10001):
+        if (found := grey + way * (color - grey)).min() >= -1e-9:
+            return found
+    raise AssertionError
+
+
+@pytest.mark.parametrize("color", [(0.5, 0.4, 0.3), (-0.05, 0.01, 0.09), (0.9, -0.1, -0.2)])
+def test_colour_without_luminance_is_neither_cut_nor_multiplied(color: tuple[float, ...]):
+    stencil = Stencil(1, 1, 1)
+    linear = np.array(color)
+    x = float(linear @ LUMINANCE)
+    light = Signal(*(stencil.Float(v) for v in (color[0], x, color[2])))
+    (whole,) = with_their_light([light], Energies([stencil.Float(3)], [stencil.Float(1)]))
+    red, luminance, blue = (v.numpy()[0] for v in whole if v is not None)
+    wanted = linear + 2 * without_negative(linear)
+    np.testing.assert_allclose([red, blue], wanted[[0, 2]], atol=1e-3)
+    np.testing.assert_allclose(luminance, 3 * x, rtol=1e-5)

@@ -482,6 +482,23 @@ def test_energy_is_kept():
     assert image.mean() == pytest.approx(frames[-1]["color"].mean(), rel=0.01)
 
 
+def test_a_coloured_sky_leaves_grey_ground_grey():
+    """One ray in sixteen finds a bright warm patch, the others what is blue: what one visibility
+    for all colours leaves of that is rare and warm, or cold; there is hardly any other light."""
+    frame, random = make_frame(48, 64, wall_end=100.0), np.random.default_rng(5)
+    blue, warm = np.array([0.15, 0.25, 0.5]), np.array([4.5, 2.2, 0.7])
+    found = random.random((48, 64, 1)) < 1 / 16
+    direct = np.where(found, warm, blue)
+    unshadowed = np.full((48, 64, 3), (15 * blue + warm) / 16)
+    indirect = np.where(random.random((48, 64, 1)) < 0.03, 0.1, 0) * np.ones(3)
+    frame = with_images(
+        frame, color=direct + indirect, direct=direct, indirect=indirect, unshadowed=unshadowed,
+        visibility=innovation_oracle.lum(direct) / innovation_oracle.lum(unshadowed),
+        emission=np.zeros((48, 64, 3)), specular=np.zeros((48, 64, 3)))
+    image, _ = run(FilteredInnovation(), [frame])
+    np.testing.assert_allclose(image.mean((0, 1)), frame["color"].mean((0, 1)), rtol=0.03)
+
+
 def test_visibility_above_its_cap_is_not_lost():
     (frame,) = split(24, 24, 1)
     visibility = frame["visibility"].copy()
