@@ -10,11 +10,14 @@ innovation.
 
     x' = min(x, max(t m, u min(d, h)))
 
-    before the last filter    x = merged history,   output = F[x'] min(S[x] / S[x'], 6)
+    before the last filter    x = merged history,   output = F[x'] + S[x - x'] l(F[x']) / w
         diffuse light t = 2.5 (its caustics are bright for a reason); u = 3/4
         glossy light t = 1.5 + 10 b, b being how bent a surface is (`bent.bent_share`)
-    before history            x = d,                d <- x' min(S[x] / S[x'], 6)
+    before history            x = d,                d <- x' + S[x - x'] l(x') / w
         glossy light of narrow lobes (roughness below 0.2) t = 4; u = 3
+
+with w = max(S[x'], l(S[x - x']) / 5): luminance is multiplied by S[x] / S[x'], at most by 6, and
+what is added has the colour of what was taken.
 
 What frame and history both have is no rare chance; and where a surface is bent each pixel sees
 another part of what is around, as in the highlight on a small thing. What is taken has its share in
@@ -23,10 +26,10 @@ pixels, as on leaves. Wider lobes meet lamps often, and what is taken from them 
 missed there; the light of other layers stays as it is, too.
 
 Under a coloured sky diffuse light holds what one visibility for all colours leaves of direct light
-(`inputs/signals.py`): colour without luminance, of either sign. No peak is made of it, and nothing
-is multiplied that is no light: x is the sum of p, the nearest to it of its luminance without
-negative components (on the way to grey), and what is left, which is neither cut nor multiplied.
-(Multiplied with the rest, open ground under a sky of blue and white was off by a fifth in blue.)
+(`inputs/signals.py`): colour almost without luminance, of either sign. It is no peak: what is taken
+is a share of p, the nearest to a pixel's light of its luminance without negative components (on the
+way to grey). When light was multiplied by 6 whatever it was, open ground under a sky of blue and
+white was off by a fifth in blue.
 
 Source: our own, of two known parts: outliers by their neighbours (as in GAMES202, lecture 13, here
 by the mean alone), and the ratio of two smoothings (Heitz et al. 2018), which gives light back.
@@ -61,17 +64,18 @@ BEFORE_FILTER = Limits({SignalKind.DIFFUSE: 2.5, SignalKind.GLOSSY: 1.5}, 0.75)
 BEFORE_HISTORY = Limits({SignalKind.GLOSSY: 4.0}, 3.0)
 
 
-class Energies(NamedTuple):
-    """Luminance of each light, and of what `without_peaks` leaves of it; or smoothings of these."""
+class Taken(NamedTuple):
+    """Of each light, the luminance that `without_peaks` leaves, x', and what it takes, x - x'; or
+    smoothings of these."""
 
-    before: list[Float]
-    after: list[Float]
+    left: list[Float]
+    taken: list[Signal]
 
 
 def without_peaks(limits: Limits, kinds: Sequence[SignalKind], lights: list[Signal],
                   seen_twice: list[Float], bent: Float | None, luminances: Taps[list[Float]],
-                  ids: Taps[Float]) -> tuple[list[Signal], Energies]:
-    """Each light without its peaks, x', and its energies.
+                  ids: Taps[Float]) -> tuple[list[Signal], Taken]:
+    """Each light without its peaks, x', and what they are.
 
     Args:
         kinds: of the lights. seen_twice: min(d, h) of each. bent: b, None for 0. luminances: x, at
@@ -95,24 +99,26 @@ def without_peaks(limits: Limits, kinds: Sequence[SignalKind], lights: list[Sign
                            limits.seen_twice * twice)
         is_peak = (x > least) & (least > 0)
         shares.append(dr.select(is_peak, least / dr.select(is_peak, x, 1), 1))
-    kept = [_scaled(light, share) for light, share in zip(lights, shares)]
-    return kept, Energies(center, [x * share for x, share in zip(center, shares)])
+    positive = [_without_negative(light) for light in lights]
+    kept = [mapped(lambda x, p, s=share: dr.fma(p, s, x - p), *both)
+            for *both, share in zip(lights, positive, shares)]
+    taken = [mapped(lambda p, s=share: p * (1 - s), p) for p, share in zip(positive, shares)]
+    return kept, Taken([x * share for x, share in zip(center, shares)], taken)
 
 
-def with_their_light(lights: list[Signal], around: Energies) -> list[Signal]:
+def with_their_light(lights: list[Signal], around: Taken) -> list[Signal]:
     """What was made of `without_peaks`, with its light again; around: smoothed."""
-    whole = [dr.select(after > 0, dr.clip(before / dr.select(after > 0, after, 1), 1, MOST), 1)
-             for before, after in zip(around.before, around.after)]
-    return [_scaled(light, factor) for light, factor in zip(lights, whole)]
-
-
-def _scaled(light: Signal, factor: Float) -> Signal:
-    """p times a factor, and what is left."""
-    return mapped(lambda x, p: dr.fma(p, factor, x - p), light, _without_negative(light))
+    whole = []
+    for light, left, taken in zip(lights, *around, strict=True):
+        among = dr.maximum(left, taken.luminance * (1 / (MOST - 1)))
+        own = dr.maximum(light.luminance, 0)
+        per = dr.select(among > 0, own / dr.select(among > 0, among, 1), 0)
+        whole.append(mapped(lambda x, more, a=per: dr.fma(a, more, x), light, taken))
+    return whole
 
 
 def _without_negative(light: Signal) -> Signal:
-    """p; light itself where nothing is negative."""
+    """p."""
     red, x, blue = light
     if red is None or blue is None:
         return light

@@ -14,6 +14,7 @@ from . import filters as oracles
 from .filters import Pixels, luminance, pairs, plane_weight_distance, reproject_bilinear
 
 H = {0: 1 / 2, 1: 1 / 4}
+MOST = 1.1  # visibility that a pixel has
 
 
 def lum(image: np.ndarray) -> np.ndarray:
@@ -39,10 +40,10 @@ def signals_of(frame: Frame) -> dict[str, np.ndarray]:
     light = frame["direct"].astype(float) + frame["indirect"] - frame["specular"]
     specular = frame["specular"].astype(float)
     unshadowed = unshadowed_of(frame)
-    told, chance = {"V": np.minimum(frame["visibility"].astype(float), 2)[..., None]}, 1.0
+    told, chance = {"V": np.minimum(frame["visibility"].astype(float), MOST)[..., None]}, 1.0
     if "group" in frame:
         y, _, chance = np.moveaxis(frame["group_sample"].astype(float)[..., None], -2, 0)
-        told = {g: np.where((frame["group"] == int(g))[..., None], np.minimum(y, 2), 0)
+        told = {g: np.where((frame["group"] == int(g))[..., None], np.minimum(y, MOST), 0)
                 for g in sorted(unshadowed)}
         chance = np.where(chance > 0, chance, np.inf)
     for name, v in told.items():
@@ -591,7 +592,7 @@ def contact(frame: Frame, m, name: str, length: np.ndarray) -> np.ndarray:
 def without_peaks(frame: Frame, image: np.ndarray, least: np.ndarray, most: Any, levels: int,
                   m) -> tuple:
     """Light without what is above `most` times the mean of the same object around and above
-    `least`, and the factor that gives it back."""
+    `least`; and, smoothed, the luminance of that, and what was taken."""
     x, shape = np.maximum(lum(image), 0), frame["id"].shape
     pixels = pixels_of(frame, m, x=x)
     count, total = np.zeros(shape), np.zeros(shape)
@@ -604,18 +605,20 @@ def without_peaks(frame: Frame, image: np.ndarray, least: np.ndarray, most: Any,
         total[where] += q.x * same
     least = np.maximum(most * total / np.maximum(count, 1), least)
     share = np.where((least > 0) & (x > least), least / np.maximum(x, 1e-30), 1)
-    before, after = np.moveaxis(smooth(frame, np.stack([x, x * share], -1), np.ones(x.shape),
-                                       levels, m), -1, 0)
-    factor = np.where(after > 0, np.clip(before / np.where(after > 0, after, 1), 1, 6), 1)
-    return scaled(image, share), factor
+    least = np.minimum(image.min(-1), 0)  # what is negative is no light
+    grey = np.where(x > least, -least / np.maximum(x - least, 1e-30), 0)[..., None]
+    taken = (1 - share)[..., None] * ((1 - grey) * image + grey * x[..., None])
+    around = smooth(frame, np.concatenate([(x * share)[..., None], taken], -1), np.ones(x.shape),
+                    levels, m)
+    return image - taken, around
 
 
-def scaled(image: np.ndarray, factor: np.ndarray) -> np.ndarray:
-    """Light times a factor, but for what makes components negative at the same luminance."""
-    x, least = np.maximum(lum(image), 0)[..., None], np.minimum(image.min(-1), 0)[..., None]
-    grey = np.where(x - least > 0, -least / np.maximum(x - least, 1e-30), 0)
-    light = (1 - grey) * image + grey * x
-    return image + (factor[..., None] - 1) * light
+def with_their_light(image: np.ndarray, around: np.ndarray) -> np.ndarray:
+    """With what was taken, in its own colour, at most five times as much light as is there."""
+    left, taken = around[..., 0], around[..., 1:]
+    among = np.maximum(left, lum(taken) / 5)
+    own = np.maximum(lum(image), 0) / np.where(among > 0, among, 1)
+    return image + np.where(among > 0, own, 0)[..., None] * taken
 
 
 def run(frames: list[Frame], m) -> np.ndarray:
@@ -743,7 +746,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
             omega = told * frame["group_sample"][..., 1].astype(float) if sparse else 1.0 * told
             follows = m.follow_shadows and "light" in frame and (
                 sparse or (name == "V" and "group" not in frame))
-            lone = np.minimum(d / np.maximum(omega, 0.1)[..., None], 2)
+            lone = np.minimum(d / np.maximum(omega, 0.1)[..., None], MOST)
             spatial = (sample_variance(frame, lone[..., 0], omega > 0, m) if sparse
                        else spatial_variance(frame, d, m))
             energy = np.zeros(found.shape)
@@ -759,8 +762,8 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
             if name == "G" and "L" in signals and has_peaks and "roughness" in frame:
                 twice = np.where(found, np.minimum(lum(d), lum(d - e)), 0)
                 twice = np.where(roughness_of(frame) < 0.2, twice, 1e36)
-                trimmed, factor = without_peaks(frame, d, 3 * twice, 4, m.innovation_levels, m)
-                whole = scaled(trimmed, factor)
+                whole = with_their_light(
+                    *without_peaks(frame, d, 3 * twice, 4, m.innovation_levels, m))
                 e = np.where(found[..., None], e + whole - d, 0)
                 d = signals[name] = whole
                 spatial = spatial_variance(frame, d, m)
@@ -805,7 +808,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
                     image = np.minimum(4 * np.maximum(image_before, left_), 1)
             if sparse:
                 norm = norm_of(frame, here, found, smoothing, m, narrow)[..., None]
-                change = np.clip(h + norm * wide, -0.5, 2) - h
+                change = np.clip(h + norm * wide, -0.5, MOST) - h
             k = light_threshold if name == "L" else m.noise_threshold
             left = length_left(name, wide, q, energy, change, h, p, k, moving)
             if name in "LG":
@@ -863,7 +866,7 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
             if (name in "LG" and "light" in frame and "layer_share" not in frame
                     and m.follow_shadows and len(signals) > 1):
                 narrow = contact(frame, m, name, ns[length_of(frame, "L")])
-            before, factor = history, np.ones(found.shape)
+            before, around = history, None
             bends, bent = None, 0.0
             if name == "G" and "L" in signals and "roughness" in frame:
                 bends, bent = bends_of(frame, ns[length_of(frame, "L")])
@@ -871,13 +874,15 @@ def filtered(frames: list[Frame], given: list[dict[str, np.ndarray]],
                 wide = m.innovation_levels if "L" in signals else m.sharp_innovation_levels
                 twice = np.where(found, np.minimum(lum(d), lum(d - e)), 0)
                 most = 2.5 if name == "L" else 1.5 + 10 * bent
-                before, factor = without_peaks(frame, history, 0.75 * twice, most, wide, m)
+                before, around = without_peaks(frame, history, 0.75 * twice, most, wide, m)
             fade = np.ones(found.shape) if name == "G" else fade
-            out[name] = scaled(guided(frame, before, s2, levels, sigmas, fade, narrow, m,
-                                      np.clip(samples, 1e-5, 1) if sparse else None,
-                                      {"L": 0.2, "G": 1.0}.get(name, 0),
-                                      int(name == "L" and has_peaks and m.output_levels
-                                          < m.innovation_levels), bends), factor)
+            out[name] = guided(frame, before, s2, levels, sigmas, fade, narrow, m,
+                               np.clip(samples, 1e-5, 1) if sparse else None,
+                               {"L": 0.2, "G": 1.0}.get(name, 0),
+                               int(name == "L" and has_peaks and m.output_levels
+                                   < m.innovation_levels), bends)
+            if around is not None:
+                out[name] = with_their_light(out[name], around)
             if sparse:
                 history = np.where(samples[..., None] > 1e-5, history, out[name])
             kept[name] = history, s2, np.minimum(samples, 64)

@@ -14,8 +14,8 @@ from onespp.denoise.filters.peaks import (
     BEFORE_FILTER,
     BEFORE_HISTORY,
     RADIUS,
-    Energies,
     Limits,
+    Taken,
     with_their_light,
     without_peaks,
 )
@@ -83,24 +83,24 @@ class PeakPasses:
 
     Attributes:
         signals: which. window: of their luminance and of object ID. trim: `without_peaks` of them.
-        energies: levels of the smoothing.
+        wide: levels of the smoothing of what is taken.
     """
 
     signals: list[int]
     window: tuple[Taps[list[Float]], Taps[Float]]
-    trim: Step[..., tuple[list[Signal], Energies]]
-    energies: list[Level]
+    trim: Step[..., tuple[list[Signal], Taken]]
+    wide: list[Level]
 
     @staticmethod
     def make(limits: Limits, signals: list[int], layout: SignalLayout, buffer: Planes,
-             surfaces: Planes, energies: Callable[[int, int], Level]) -> PeakPasses:
+             surfaces: Planes, wide: Callable[[int, int], Level]) -> PeakPasses:
         kinds = [layout.kinds[s] for s in signals]
         levels = layout.innovation_levels if signals else 0
         return PeakPasses(
             signals, (buffer.taps(_WINDOW, range(len(signals))),
                       surfaces.taps(_WINDOW, [_ID]).named(single)),
             Step(lambda *a: without_peaks(limits, kinds, *a)),
-            [energies(i, 2 * len(signals)) for i in range(levels)])
+            [wide(i, 4 * len(signals)) for i in range(levels)])
 
 
 @dataclass(frozen=True)
@@ -155,14 +155,15 @@ class Passes:
             _SHADOW_PLANES * (layout.groups or 1) + _CONTACT_PLANES * (not layout.has_layers)
             + _LOBE_PLANES * layout.kinds.count(SignalKind.GLOSSY))
         buffer = stencil.planes([0.0] * max(len(layout.smoothing_rules), len(spread),
-                                            layout.output_planes(layout.output_level(0))))
+                                            layout.output_planes(layout.output_level(0)),
+                                            4 * len(layout.with_peaks)))
 
         def smoothing(i: int) -> Level:
             rules = layout.smoothing_level(i)
             return Level.make(i, buffer, len(rules), surfaces, _VALID_INVERSE_DEPTH,
                               lambda *a: smooth_level(rules, *a))
 
-        def energies(i: int, count: int) -> Level:
+        def wide(i: int, count: int) -> Level:
             rules = [PlaneRule(layout.innovation_levels)] * count
             return Level.make(i, buffer, len(rules), surfaces, _INVERSE_DEPTH,
                               lambda *a: smooth_level(rules, *a))
@@ -203,8 +204,8 @@ class Passes:
             Step(lambda *a: merge(stencil, layout, *a)),
             [output(i) for i in range(layout.deepest_output)],
             PeakPasses.make(BEFORE_HISTORY, layout.with_peaks_of_frame, layout, buffer, surfaces,
-                            energies),
-            PeakPasses.make(BEFORE_FILTER, layout.with_peaks, layout, buffer, surfaces, energies),
+                            wide),
+            PeakPasses.make(BEFORE_FILTER, layout.with_peaks, layout, buffer, surfaces, wide),
             Step(with_their_light),
             Step(seen_twice_by_narrow_lobes), Step(renewed),
             Step(residual),
@@ -276,10 +277,10 @@ class Passes:
         before, changes = ([of_all[s] for s in which]
                            for of_all in (signals, innovations.signals))
         length = innovations.lengths[0]
-        trimmed, energies = self._trimmed(self.peaks_of_frame, signals,
-                                          self.twice(before, changes, length, roughness),
-                                          None, plane)
-        whole = self.make_whole([trimmed[s] for s in which], energies)
+        trimmed, taken = self._trimmed(self.peaks_of_frame, signals,
+                                       self.twice(before, changes, length, roughness),
+                                       None, plane)
+        whole = self.make_whole([trimmed[s] for s in which], taken)
         news = self.renew(before, whole, changes, length)
         signals, changes = list(signals), list(innovations.signals)
         powers = list(innovations.energies)
@@ -302,15 +303,15 @@ class Passes:
         before = [_counted(noisy) for noisy in merged.signals]
         if merged.parts is not None:
             before = [before[0]._replace(parts=merged.parts)]
-        lights, energies = self._trimmed(self.peaks_of_history, [noisy.signal for noisy in before],
+        lights, taken = self._trimmed(self.peaks_of_history, [noisy.signal for noisy in before],
                                          list(merged.seen_twice), bends and bent_share(bends),
                                          plane)
         before = [noisy._replace(signal=light) for noisy, light in zip(before, lights)]
         filtered = self._through(self.output, before, plane, falloff, sigmas)
         if merged.parts is None:
             output = [noisy.signal for noisy in filtered]
-            if energies is not None:
-                lights = self.make_whole([output[s] for s in self.layout.with_peaks], energies)
+            if taken is not None:
+                lights = self.make_whole([output[s] for s in self.layout.with_peaks], taken)
                 for s, light in zip(self.layout.with_peaks, lights, strict=True):
                     output[s] = light
             return output
@@ -320,16 +321,16 @@ class Passes:
 
     def _trimmed(self, peaks: PeakPasses, signals: list[Signal], seen_twice: list[Float],
                  bent: Float | None, plane: TangentPlane,
-                 ) -> tuple[list[Signal], Energies | None]:
-        """Signals without peaks, and the energies of those that may have some, smoothed."""
+                 ) -> tuple[list[Signal], Taken | None]:
+        """Signals without peaks, and what was taken of those that may have some, smoothed."""
         if not peaks.signals:
             return signals, None
         lights = [signals[s] for s in peaks.signals]
         self.buffer.store([dr.maximum(light.luminance, 0) for light in lights], gutters=True)
-        lights, energies = peaks.trim(lights, seen_twice, bent, *peaks.window)
+        lights, taken = peaks.trim(lights, seen_twice, bent, *peaks.window)
         trimmed = dict(zip(peaks.signals, lights, strict=True))
         return ([trimmed.get(s, signal) for s, signal in enumerate(signals)],
-                self._through(peaks.energies, energies, plane))
+                self._through(peaks.wide, taken, plane))
 
     def _through(self, levels: list[Level], values: T, plane: TangentPlane,
                  *arguments: Any) -> T:

@@ -8,8 +8,8 @@ import pytest
 from onespp.denoise.filters.peaks import (
     BEFORE_FILTER,
     BEFORE_HISTORY,
-    Energies,
     Limits,
+    Taken,
     with_their_light,
     without_peaks,
 )
@@ -30,15 +30,15 @@ def trimmed(light: np.ndarray, ids: np.ndarray,
     planes = stencil.planes([0.0, -1.0])
     (x,), (id_,) = stencil.load(light.astype(np.float32)), stencil.load(ids.astype(np.int32))
     planes.store([x, stencil.Float(id_)], gutters=True)
-    (signal,), energies = without_peaks(
+    (signal,), taken = without_peaks(
         limits, [kind], [Signal(2 * x, x, x)], [stencil.opaque(twice)],
         stencil.opaque(bent) if bent else None, planes.taps(AROUND, [0]),
         planes.taps(AROUND, [1]).named(single))
     assert signal.red is not None
-    red, before, after = (stencil.image(Color(v, v, v))[..., 0] for v in (
-        signal.red, energies.before[0], energies.after[0]))
-    np.testing.assert_allclose(before, light, rtol=1e-6)
-    return red, after / np.maximum(light, 1e-30)
+    red, left, more = (stencil.image(Color(v, v, v))[..., 0] for v in (
+        signal.red, taken.left[0], taken.taken[0].luminance))
+    np.testing.assert_allclose(left + more, light, rtol=1e-6)
+    return red, left / np.maximum(light, 1e-30)
 
 
 @pytest.mark.parametrize(("limits", "kind", "times"), [
@@ -82,32 +82,44 @@ def test_another_object_or_the_dark_around_makes_no_peak():
     assert share[3, 3] == 1
 
 
-def test_what_was_taken_comes_back_where_light_is():
+def test_what_was_taken_comes_back_where_light_is_in_its_own_colour():
     stencil = Stencil(1, 4, 1)
     light = Signal(stencil.Float(2), stencil.Float(1), stencil.Float(0))
-    around = Energies([stencil.Float([1.5, 0.0, 19, 1.0])], [stencil.Float([1, 0, 1, 1.0001])])
+    taken = stencil.Float([0.5, 0, 18, 0])
+    around = Taken([stencil.Float([1, 0, 1, 1])], [Signal(0 * taken, taken, 3 * taken)])
     (whole,) = with_their_light([light], around)
-    assert whole.red is not None
-    np.testing.assert_allclose(whole.red.numpy(), [3, 2, 12, 2], rtol=1e-6)
+    red, luminance, blue = (v.numpy() for v in whole if v is not None)
+    np.testing.assert_allclose(luminance, [1.5, 1, 6, 1], rtol=1e-6)
+    np.testing.assert_allclose(red, 2, rtol=1e-6)
+    np.testing.assert_allclose(blue, [1.5, 0, 15, 0], rtol=1e-6)
 
 
 def without_negative(color: np.ndarray) -> np.ndarray:
     """Of the luminance of `color`, on the way from it to grey."""
-    grey = np.full(3, color @ LUMINANCE)
+    grey = np.full(3, max(color @ LUMINANCE, 0))
     for way in np.linspace(1, 0, 10001):
         if (found := grey + way * (color - grey)).min() >= -1e-9:
             return found
     raise AssertionError
 
 
-@pytest.mark.parametrize("color", [(0.5, 0.4, 0.3), (-0.05, 0.01, 0.09), (0.9, -0.1, -0.2)])
-def test_colour_without_luminance_is_neither_cut_nor_multiplied(color: tuple[float, ...]):
-    stencil = Stencil(1, 1, 1)
+@pytest.mark.parametrize("color", [(90, 100, 80), (-50, 100, 120), (90, 100, -200)])
+def test_a_peak_is_light_and_colour_without_luminance_stays(color: tuple[float, ...]):
+    stencil = Stencil(7, 7, 2)
     linear = np.array(color)
-    x = float(linear @ LUMINANCE)
-    light = Signal(*(stencil.Float(v) for v in (color[0], x, color[2])))
-    (whole,) = with_their_light([light], Energies([stencil.Float(3)], [stencil.Float(1)]))
-    red, luminance, blue = (v.numpy()[0] for v in whole if v is not None)
-    wanted = linear + 2 * without_negative(linear)
-    np.testing.assert_allclose([red, blue], wanted[[0, 2]], atol=1e-3)
-    np.testing.assert_allclose(luminance, 3 * x, rtol=1e-5)
+    images = np.zeros((7, 7, 3))
+    images[3, 3] = linear
+    luminance = np.maximum(images @ LUMINANCE, 1)
+    planes = stencil.planes([0.0, -1.0])
+    x, red, blue = (stencil.load(image.astype(np.float32))[0]
+                    for image in (luminance, images[..., 0], images[..., 2]))
+    planes.store([x, 0 * x], gutters=True)
+    _, (_, (taken,)) = without_peaks(
+        BEFORE_FILTER, [SignalKind.DIFFUSE], [Signal(red, x, blue)], [stencil.opaque(0)], None,
+        planes.taps(AROUND, [0]), planes.taps(AROUND, [1]).named(single))
+    share = 1 - 2.5 / luminance[3, 3]
+    wanted = share * without_negative(linear)
+    for found, component in ((taken.red, wanted[0]), (taken.blue, wanted[2]),
+                             (taken.luminance, wanted @ LUMINANCE)):
+        image = stencil.image(Color(found, found, found))[..., 0]
+        np.testing.assert_allclose(image[3, 3], component, atol=0.02)

@@ -496,7 +496,7 @@ def test_a_coloured_sky_leaves_grey_ground_grey():
         visibility=innovation_oracle.lum(direct) / innovation_oracle.lum(unshadowed),
         emission=np.zeros((48, 64, 3)), specular=np.zeros((48, 64, 3)))
     image, _ = run(FilteredInnovation(), [frame])
-    np.testing.assert_allclose(image.mean((0, 1)), frame["color"].mean((0, 1)), rtol=0.03)
+    np.testing.assert_allclose(image.mean((0, 1)), frame["color"].mean((0, 1)), rtol=0.05)
 
 
 def test_visibility_above_its_cap_is_not_lost():
