@@ -13,7 +13,7 @@ without a diffuse lobe (its albedo is 1, its roughness below 1) all of that is G
 
 The cap is little above 1: strata of a sky are wide, and where nothing is in the way V is noise of
 which point was drawn, by half of itself. Of L it is averaged more widely than of V, whose shadows
-are sharp (seven skies of our own: +0.4 dB over a cap of 2; under lamps no difference).
+are sharp (seven skies of our own: +0.5 dB over a cap of 2; under lamps no difference).
 
 Where several lights meet, V is noise of which of them the shadow ray went to. Frames of such a
 scene have groups of lights g, and several signals V_g: each is known where the ray went to its

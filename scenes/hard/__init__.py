@@ -15,6 +15,7 @@ from .camera import backwards, cut, grazing
 from .extent import far, huge, sky, tiny
 from .light import (
     color,
+    colored_sky,
     emitters,
     fireflies,
     glossy_color,
@@ -52,6 +53,7 @@ HARD: Mapping[str, Hard] = MappingProxyType({
     "color": Hard(color, EVENT),
     "glossy-color": Hard(glossy_color, EVENT, diffuse=False),
     "one-of-two": Hard(one_of_two, EVENT, diffuse=False),
+    "colored-sky": Hard(colored_sky, diffuse=False),
     "moving-light": Hard(moving_light),
     "emitters": Hard(emitters),
     "fireflies": Hard(fireflies, diffuse=False),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from onespp.scenes.animation import Animation
 from onespp.scenes.description import Color, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.materials import diffuse, metal
@@ -50,6 +52,31 @@ def one_of_two() -> Scene:
     return scene("one-of-two", "One of two lamps is switched off over a still metal floor",
                  *surroundings(floor=metal((0.95, 0.8, 0.5), 0.25)), *_THINGS, side,
                  lamp(_at_event(LIGHT, (0.0, 0.0, 0.0))))
+
+
+def colored_sky() -> Scene:
+    """What one visibility for all colours leaves is rare and bright in one colour, often dim in
+    another: gray ground takes a cast where either is lost."""
+    return scene("colored-sky", "A sky of amber, cyan and violet over even ground and metal",
+                 Shape("floor", Rectangle(), diffuse((0.5, 0.5, 0.5)),
+                       rotate(X, -90) @ scale((20, 20, 1))),
+                 ball(Animation(lambda f: at(-1.1 + 0.08 * f, 0.45, 0.3, 0.45))),
+                 Shape("metal", Sphere(), metal((0.9, 0.9, 0.9), 0.2), at(0.7, 0.5, 0.2)),
+                 environment=_patches())
+
+
+def _patches() -> np.ndarray:
+    """(h, w, 3) radiance: soft patches before a dim blue, by latitude and longitude."""
+    latitude = (0.5 - (np.arange(32)[:, None] + 0.5) / 32) * np.pi
+    longitude = (np.arange(64) + 0.5) / 64 * 2 * np.pi
+    image = np.full((32, 64, 3), (0.04, 0.05, 0.09))
+    for up, around, sharpness, tint in ((0.7, 0.9, 20, (9.0, 4.5, 0.8)),
+                                        (0.5, 2.9, 12, (0.4, 2.5, 3.5)),
+                                        (1.1, 4.6, 30, (4.0, 0.8, 7.0))):
+        cosine = (np.sin(latitude) * np.sin(up)
+                  + np.cos(latitude) * np.cos(up) * np.cos(longitude - around))
+        image += np.exp(sharpness * (cosine - 1))[..., None] * tint
+    return image.astype(np.float32)
 
 
 def moving_light() -> Scene:

@@ -114,6 +114,14 @@ def test_a_hard_scene_renders_to_finite_images_and_a_finite_reference(name):
     assert reference.mean() > 0.01
 
 
+def test_a_sky_of_many_colours_leaves_even_ground_its_own():
+    renderer = Renderer(HARD["colored-sky"].make(), 64, 96, direct="resampled", sampler="zsobol")
+    frame, method = renderer.frame(0, channels=renderer.channels), build("onespp")
+    image, _ = method(frame, method.init(64, 96))
+    ground = np.isclose(frame["albedo"], 0.5).all(-1)
+    np.testing.assert_allclose(image[ground].mean(0), frame["color"][ground].mean(0), rtol=0.02)
+
+
 @each_scene
 def test_every_pixel_lies_on_the_object_whose_id_it_has(name):
     """With a normal that faces the camera. What is scaled to nothing is not there. (Images are
