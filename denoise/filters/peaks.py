@@ -25,11 +25,11 @@ S of the light all around. Light is lost where the limit, 6, is reached: where S
 pixels, as on leaves. Wider lobes meet lamps often, and what is taken from them before history is
 missed there; the light of other layers stays as it is, too.
 
-Under a coloured sky diffuse light holds what one visibility for all colours leaves of direct light
-(`inputs/signals.py`): colour almost without luminance, of either sign. It is no peak: what is taken
-is a share of p, the nearest to a pixel's light of its luminance without negative components (on the
-way to grey). When light was multiplied by 6 whatever it was, open ground under a sky of blue and
-white was off by a fifth in blue.
+Under a sky or a lamp of many colours diffuse light holds what one visibility for all of them leaves
+of direct light (`inputs/signals.py`): colour almost without luminance, of either sign. It is no
+peak: what is taken is a share of p, a pixel's light mixed with just so much grey of its luminance
+that no component is negative. When light was multiplied by 6 whatever it was, open ground under a
+sky of blue and white was off by a fifth in blue.
 
 Source: our own, of two known parts: outliers by their neighbours (as in GAMES202, lecture 13, here
 by the mean alone), and the ratio of two smoothings (Heitz et al. 2018), which gives light back.
@@ -42,9 +42,8 @@ from typing import NamedTuple
 
 import drjit as dr
 
-from onespp.denoise.inputs.signals import Signal, SignalKind
+from onespp.denoise.inputs.signals import Signal, SignalKind, color_of
 from onespp.denoise.jit.arrays import Float
-from onespp.denoise.jit.color import LuminanceColor, with_green
 from onespp.denoise.jit.structure import mapped
 from onespp.denoise.jit.taps import Taps
 
@@ -64,9 +63,9 @@ BEFORE_FILTER = Limits({SignalKind.DIFFUSE: 2.5, SignalKind.GLOSSY: 1.5}, 0.75)
 BEFORE_HISTORY = Limits({SignalKind.GLOSSY: 4.0}, 3.0)
 
 
-class Taken(NamedTuple):
-    """Of each light, the luminance that `without_peaks` leaves, x', and what it takes, x - x'; or
-    smoothings of these."""
+class Trimmed(NamedTuple):
+    """Of each light, the luminance that `without_peaks` leaves, l(x'), and what it takes, x - x';
+    or smoothings of these."""
 
     left: list[Float]
     taken: list[Signal]
@@ -74,8 +73,8 @@ class Taken(NamedTuple):
 
 def without_peaks(limits: Limits, kinds: Sequence[SignalKind], lights: list[Signal],
                   seen_twice: list[Float], bent: Float | None, luminances: Taps[list[Float]],
-                  ids: Taps[Float]) -> tuple[list[Signal], Taken]:
-    """Each light without its peaks, x', and what they are.
+                  ids: Taps[Float]) -> tuple[list[Signal], Trimmed]:
+    """Each light without its peaks, x', and what was taken.
 
     Args:
         kinds: of the lights. seen_twice: min(d, h) of each. bent: b, None for 0. luminances: x, at
@@ -103,10 +102,10 @@ def without_peaks(limits: Limits, kinds: Sequence[SignalKind], lights: list[Sign
     kept = [mapped(lambda x, p, s=share: dr.fma(p, s, x - p), *both)
             for *both, share in zip(lights, positive, shares)]
     taken = [mapped(lambda p, s=share: p * (1 - s), p) for p, share in zip(positive, shares)]
-    return kept, Taken([x * share for x, share in zip(center, shares)], taken)
+    return kept, Trimmed([x * share for x, share in zip(center, shares)], taken)
 
 
-def with_their_light(lights: list[Signal], around: Taken) -> list[Signal]:
+def with_their_light(lights: list[Signal], around: Trimmed) -> list[Signal]:
     """What was made of `without_peaks`, with its light again; around: smoothed."""
     whole = []
     for light, left, taken in zip(lights, *around, strict=True):
@@ -118,12 +117,9 @@ def with_their_light(lights: list[Signal], around: Taken) -> list[Signal]:
 
 
 def _without_negative(light: Signal) -> Signal:
-    """p."""
-    red, x, blue = light
-    if red is None or blue is None:
-        return light
-    least = dr.minimum(*with_green(LuminanceColor(red, x, blue))[:2])
-    least = dr.minimum(least, blue)
-    grey = dr.maximum(x, 0)
+    """p of the module's header, black where luminance is below 0."""
+    red, green, blue = color_of(light)
+    least = dr.minimum(dr.minimum(red, green), blue)
+    grey = dr.maximum(light.luminance, 0)
     way = grey / dr.select(least < 0, grey - least, 1)
     return mapped(lambda v: dr.select(least < 0, dr.fma(way, v - grey, grey), v), light)

@@ -116,14 +116,14 @@ class Signals:
 
     def color(self, signals: Sequence[Signal]) -> Color:
         """The colour that (filtered) signals make, in the order of `listed`."""
-        light = _color(signals[0])
+        light = color_of(signals[0])
         if self.is_bare is not None:  # what has leaked into it from others is none of its own
             light = _black_where(self.is_bare, light)
         color = self.texture.modulate(light)
         unshadowed = iter(self.unshadowed)
         for kind, signal in zip(self.kinds[1:], signals[1:], strict=True):
             if kind is SignalKind.GLOSSY:
-                gloss = self.of_gloss.modulate(_color(signal))
+                gloss = self.of_gloss.modulate(color_of(signal))
                 color = Color(*[c + g for c, g in zip(color, gloss)])
             else:
                 color = _with(color, signal.luminance, next(unshadowed))
@@ -131,7 +131,7 @@ class Signals:
 
     def by_balls(self, caustic: Signal) -> Color:
         """The colour of a (filtered) caustic."""
-        return Texture(self.texture.albedo).modulate(_color(caustic))
+        return Texture(self.texture.albedo).modulate(color_of(caustic))
 
 
 def read_signals(frame: Frame, color: Color, stencil: Stencil, demodulate: bool,
@@ -223,5 +223,6 @@ def _of_light(light: Color) -> Signal:
     return Signal(light.red, luminance(light), light.blue)
 
 
-def _color(light: Signal) -> Color:
+def color_of(light: Signal) -> Color:
+    """Red, green and blue of a signal of light."""
     return with_green(LuminanceColor(*arrays_of(light)))

@@ -15,7 +15,7 @@ from onespp.denoise.filters.peaks import (
     BEFORE_HISTORY,
     RADIUS,
     Limits,
-    Taken,
+    Trimmed,
     with_their_light,
     without_peaks,
 )
@@ -88,7 +88,7 @@ class PeakPasses:
 
     signals: list[int]
     window: tuple[Taps[list[Float]], Taps[Float]]
-    trim: Step[..., tuple[list[Signal], Taken]]
+    trim: Step[..., tuple[list[Signal], Trimmed]]
     wide: list[Level]
 
     @staticmethod
@@ -321,7 +321,7 @@ class Passes:
 
     def _trimmed(self, peaks: PeakPasses, signals: list[Signal], seen_twice: list[Float],
                  bent: Float | None, plane: TangentPlane,
-                 ) -> tuple[list[Signal], Taken | None]:
+                 ) -> tuple[list[Signal], Trimmed | None]:
         """Signals without peaks, and what was taken of those that may have some, smoothed."""
         if not peaks.signals:
             return signals, None

@@ -9,7 +9,7 @@ from onespp.denoise.filters.peaks import (
     BEFORE_FILTER,
     BEFORE_HISTORY,
     Limits,
-    Taken,
+    Trimmed,
     with_their_light,
     without_peaks,
 )
@@ -86,7 +86,7 @@ def test_what_was_taken_comes_back_where_light_is_in_its_own_colour():
     stencil = Stencil(1, 4, 1)
     light = Signal(stencil.Float(2), stencil.Float(1), stencil.Float(0))
     taken = stencil.Float([0.5, 0, 18, 0])
-    around = Taken([stencil.Float([1, 0, 1, 1])], [Signal(0 * taken, taken, 3 * taken)])
+    around = Trimmed([stencil.Float([1, 0, 1, 1])], [Signal(0 * taken, taken, 3 * taken)])
     (whole,) = with_their_light([light], around)
     red, luminance, blue = (v.numpy() for v in whole if v is not None)
     np.testing.assert_allclose(luminance, [1.5, 1, 6, 1], rtol=1e-6)
@@ -123,3 +123,14 @@ def test_a_peak_is_light_and_colour_without_luminance_stays(color: tuple[float, 
                              (taken.luminance, wanted @ LUMINANCE)):
         image = stencil.image(Color(found, found, found))[..., 0]
         np.testing.assert_allclose(image[3, 3], component, atol=0.02)
+
+
+@pytest.mark.parametrize("color", [(-1, -1, -1), (-0.5, -0.2, 0.7), (0, 0, 0)])
+def test_what_has_no_luminance_stays_as_it_is(color: tuple[float, ...]):
+    stencil, values = Stencil(1, 1, 2), (color[0], np.dot(color, LUMINANCE), color[2])
+    planes = stencil.planes([0.0, -1.0])
+    planes.store([stencil.constant(0), stencil.constant(0)], gutters=True)
+    ((signal,), _) = without_peaks(
+        BEFORE_FILTER, [SignalKind.DIFFUSE], [Signal(*(stencil.Float(v) for v in values))],
+        [stencil.opaque(0)], None, planes.taps(AROUND, [0]), planes.taps(AROUND, [1]).named(single))
+    np.testing.assert_allclose([np.ravel(v)[0] for v in signal if v is not None], values, atol=1e-7)
