@@ -3,12 +3,12 @@
 # pyright: standard
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any, Generic, ParamSpec, TypeVar, cast
 
 import drjit as dr
+
+from onespp.render.host.recorded import no_collection
 
 from .structure import Form, build, flatten
 from .taps import Taps
@@ -52,7 +52,7 @@ class Step(Generic[P, R]):
         call.form, arrays, call.taps = flatten(arguments)
         call.number = call.numbers.setdefault(call.form, len(call.numbers))
         try:
-            with _no_collection():
+            with no_collection():
                 results = self._frozen(arrays, [taps.arrays for taps in call.taps])
         finally:
             call.taps = []
@@ -75,16 +75,3 @@ class _Call:
         self.number = 0
         self.numbers: dict[Form, int] = {}
         self.results: dict[int, Form] = {}
-
-
-@contextmanager
-def _no_collection() -> Iterator[None]:
-    """Keeps Python's cycle collector away: an array that it frees while Dr.Jit records a step ends
-    the process (`enqueue_host_func(): this function cannot be recorded`)."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()

@@ -42,6 +42,8 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
+from onespp.render.host.aligned import owned
+
 from .variant import mi
 
 _MICROFACETS = ("RoughConductor", "RoughDielectric", "RoughPlastic", "PolarizedPlastic")
@@ -84,8 +86,14 @@ class Appearance:
             if not _is_told(bsdf):
                 self._untold.append(bsdf)
                 rows[2, shapes] = len(self._untold)
-        self._alphas, self._untold_row = mi.Float(alphas), mi.UInt32(rows[2])
-        self._varying_row, self._mapped_row = mi.UInt32(rows[0]), mi.UInt32(rows[1])
+        self._alphas = owned(mi.Float, alphas)
+        self._varying_row, self._mapped_row, self._untold_row = (owned(mi.UInt32, row)
+                                                                 for row in rows)
+
+    @property
+    def tables(self) -> list[Any]:
+        """By registry index: all arrays of its own that kernels read."""
+        return [self._alphas, self._varying_row, self._mapped_row, self._untold_row]
 
     def roughness(self, si: mi.SurfaceInteraction3f) -> mi.Float:
         """GGX alpha of the glossy lobe; 0: a mirror, 1: no such lobe, or no surface."""

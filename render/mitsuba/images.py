@@ -23,7 +23,7 @@ from collections.abc import Mapping
 import drjit as dr
 import numpy as np
 
-from onespp.render.host.aligned import aligned
+from onespp.render.host.aligned import owned
 from onespp.scenes.description import Disk, Mesh, Rectangle, Scene, Shape, Sphere
 
 from .appearance import nested
@@ -129,7 +129,7 @@ class Images:
         """By registry index, which of some shapes it is, from 1; 0: none."""
         rows = np.zeros(len(self.rows), np.uint32)
         rows[shapes] = 1 + np.arange(len(shapes))
-        return aligned(mi.UInt32, rows)
+        return owned(mi.UInt32, rows)
 
     def flat_planes(self, frame: float) -> np.ndarray:
         """(n, 2, 3) a point and the unit normal of each of `flat`, world space."""

@@ -20,7 +20,7 @@ from typing import Any, cast
 import drjit as dr
 import numpy as np
 
-from onespp.render.host.aligned import aligned
+from onespp.render.host.aligned import owned
 from onespp.scenes.description import (
     Cylinder,
     Disk,
@@ -181,12 +181,30 @@ class MitsubaScene:
     @cached_property
     def image_rows(self) -> mi.UInt32:
         """The rows of `images`, by registry index."""
-        return aligned(mi.UInt32, self.images.rows)
+        return owned(mi.UInt32, self.images.rows)
 
     @cached_property
     def masks(self) -> mi.UInt32 | None:
         """Which shapes are cut out by masks, by registry index; None if none is."""
         return _where_any(self.images.masks)
+
+    @property
+    def tables(self) -> list[Any]:
+        """By registry index, and by merged face: all arrays that kernels read of it beside
+        `mi_scene`; None where there are none."""
+        return [self.id_from_registry, self._id_from_face, self.image_rows, self.masks, self.clear,
+                self.bent_glass, *self.appearance.tables]
+
+    @cached_property
+    def recordable(self) -> bool:
+        """Whether what its kernels read is where it was when a frame is set, or in `tables` and the
+        parameters of `mi_scene`: not if a mesh that shines as a picture moves, as Mitsuba then
+        traces rays through another scene of its uv (`pictured_lamps.py`)."""
+        moving = {self._ids[shape.name] for shape in self.description.shapes
+                  if shape.moves and isinstance(shape.geometry, Mesh)}
+        return not any(shape.id() in moving and shape.is_emitter() and mi.has_flag(
+            shape.emitter().flags(), mi.EmitterFlags.SpatiallyVarying)
+            for shape in self.mi_scene.shapes())
 
     @cached_property
     def bent_glass(self) -> mi.UInt32 | None:
@@ -337,7 +355,7 @@ class MitsubaScene:
             if (index := registry_index.get(self._ids[name])) is not None:
                 table[index] = object_id
         if not together:
-            return aligned(mi.UInt32, table), None
+            return owned(mi.UInt32, table), None
         number = {name: object_id for object_id, name in enumerate(names)}
         faces: list[np.ndarray] = []
         start = len(names)
@@ -347,12 +365,12 @@ class MitsubaScene:
                 count = len(cast(Mesh, shape.geometry).faces)
                 faces.append(np.full(count, number[shape.name], np.uint32))
                 start += count
-        return aligned(mi.UInt32, table), aligned(mi.UInt32, np.concatenate(faces))
+        return owned(mi.UInt32, table), owned(mi.UInt32, np.concatenate(faces))
 
 
 def _where_any(marks: np.ndarray) -> mi.UInt32 | None:
     """Marks of shapes by registry index, None where none is marked."""
-    return aligned(mi.UInt32, marks) if marks.any() else None
+    return owned(mi.UInt32, marks) if marks.any() else None
 
 
 def _registry_index(shape: Any) -> int:
@@ -423,5 +441,5 @@ def _cofactors(linear: np.ndarray) -> np.ndarray:
 
 def _jit(array: np.ndarray) -> mi.Float | mi.UInt32:
     if array.dtype == np.uint32:
-        return aligned(mi.UInt32, array)
-    return aligned(mi.Float, array.astype(np.float32))
+        return owned(mi.UInt32, array)
+    return owned(mi.Float, array.astype(np.float32))

@@ -37,7 +37,7 @@ from .path import Radiance, sum_of_samples, trace
 from .replacement import Replaced, replaced
 from .replay import replay
 from .sampler import FRAME_STREAM, REFERENCE_STREAM, Sampler, Sobol, keys_from_seed
-from .view import View
+from .view import Now, View
 
 _TRACED = {*RADIANCE, *SPLIT, *SHADOW, *GROUPED, *GLOSS, *CAUSTIC, *PATH}
 """Channels that take more than the first hit."""
@@ -61,8 +61,8 @@ class Renderer(View):
 
     @turn()
     def frame(self, index: int, seed: int = 0, channels: Sequence[str] = FRAME) -> Frame:
-        """One frame at 1 spp: one kernel, only the channels asked for; then a small one a colour,
-        which lays its planes side by side. (Before it a small one of what lights give, where they
+        """One frame at 1 spp: one kernel, only the channels asked for; then a small one, which lays
+        the planes of colours side by side. (Before it a small one of what lights give, where they
         have changed: `lights/middles.py`.)
 
         The result depends on (scene, index, seed, size) alone, and never on which other frames
@@ -88,8 +88,9 @@ class Renderer(View):
         if set(channels) & _TRACED:
             _ = self.lights  # before the stage is set: to find them moves it
         self.stage.set_frame(index)
-        planes = self._trace_frame(index, seed, [c for c in channels if c not in REPLAY])
-        dr.eval(planes)
+        keys = keys_from_seed(seed, FRAME_STREAM, index)
+        planes = self.replayed(Renderer._planes, tuple(c for c in channels if c not in REPLAY),
+                               self.now(keys))
         matrices = camera_matrices(self.scene.camera, index, self.height, self.width,
                                    self.jitter_at(index))
         images = {name: self._image(value) for name, value in planes.items()}
@@ -114,16 +115,22 @@ class Renderer(View):
         with dr.suspend_grad():
             color = self._trace_samples(index, seed, part, start, count, antialias)
         dr.eval(color)
-        return self._image(color)
+        return self._image(dr.ravel(color))
 
-    def _trace_frame(self, index: int, seed: int, channels: Sequence[str]) -> dict:
+    def _planes(self, channels: Sequence[str], now: Now) -> dict[str, Any]:
+        """Evaluated, those of a color side by side."""
+        planes = self._trace_frame(channels, now)
+        dr.eval(planes)
+        return {name: dr.ravel(plane) if dr.depth_v(plane) > 1 else plane
+                for name, plane in planes.items()}
+
+    def _trace_frame(self, channels: Sequence[str], now: Now) -> dict[str, Any]:
         with dr.suspend_grad():
-            scene = self.stage.mi_scene
+            scene = now.scene
             pixel = dr.arange(mi.UInt32, self.height * self.width)
-            rays = self.rays()
-            ray, depth_per_length = rays.at(*self.centres(pixel))
+            ray, depth_per_length = now.rays.at(*self.centres(pixel))
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
-            sampler = self.new_sampler(keys_from_seed(seed, FRAME_STREAM, index), pixel)
+            sampler = self.new_sampler(now.keys, pixel)
             seen, row, behind = ray, None, None
             if self.stage.images.any:
                 behind = replaced(self.stage, ray, pi, sampler)
@@ -131,11 +138,10 @@ class Renderer(View):
             planes = {}
             if set(channels) & _TRACED:
                 radiance = trace(scene, seen, pi, sampler, self.scene.max_depth,
-                                 self.candidates, self.lights_now, behind,
-                                 narrow=self._narrow, clear=self.stage.clear,
-                                 mirrors=self.mirrors, balls=self.balls)
+                                 self.candidates, now.lights, behind, narrow=self._narrow,
+                                 clear=self.stage.clear, mirrors=now.mirrors, balls=now.balls)
                 if behind and behind.other:
-                    radiance = self._with_layers(radiance, behind, sampler)
+                    radiance = self._with_layers(radiance, behind, sampler, now)
                 unit = dr.opaque(mi.Float, self.stage.unit)
                 planes = {
                     "color": radiance.emission + radiance.direct + radiance.indirect,
@@ -181,16 +187,17 @@ class Renderer(View):
             return None
         return lambda si: appearance.is_narrow(si, NARROW)
 
-    def _with_layers(self, radiance: Radiance, behind: Replaced, sampler: Sampler) -> Radiance:
+    def _with_layers(self, radiance: Radiance, behind: Replaced, sampler: Sampler,
+                     now: Now) -> Radiance:
         """Light with that of other layers: their lamps, and of one of them the rest, specular."""
-        scene, layer, aside = self.stage.mi_scene, behind.other, behind.aside
+        scene, layer, aside = now.scene, behind.other, behind.aside
         assert layer is not None
         assert aside is not None
         pi = scene.ray_intersect_preliminary(layer.ray, coherent=False,
                                              active=dr.max(layer.throughput) > 0)
         other = trace(scene, layer.ray, pi, sampler, self.scene.max_depth, self.candidates,
                       behind=layer, tell_straight=True, clear=self.stage.clear,
-                      mirrors=self.mirrors, balls=self.balls, bent=self.stage.bent_glass)
+                      mirrors=now.mirrors, balls=now.balls, bent=self.stage.bent_glass)
         assert other.straight is not None
         light = other.emission + other.direct + other.indirect - other.straight
         light = dr.maximum(light, 0)  # (rounding)
@@ -226,9 +233,9 @@ class Renderer(View):
         return color
 
     def _image(self, value: object) -> np.ndarray:
-        """(h, w) or (h, w, 3) NumPy copy of evaluated planes."""
-        size = (self.height, self.width)
-        planes: Any = value
-        if dr.depth_v(planes) > 1:  # by all threads, which np.stack is not
-            return dr.ravel(planes).numpy().reshape(*size, -1)
-        return np.broadcast_to(planes.numpy(), self.height * self.width).reshape(size).copy()
+        """(h, w) or (h, w, 3) NumPy copy of evaluated planes, side by side."""
+        values: Any = value
+        size, count = (self.height, self.width), self.height * self.width
+        if dr.width(values) == 3 * count:
+            return values.numpy().reshape(*size, 3)
+        return np.broadcast_to(values.numpy(), count).reshape(size).copy()

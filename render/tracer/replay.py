@@ -21,13 +21,13 @@ from dataclasses import dataclass
 import drjit as dr
 import numpy as np
 
-from onespp.render.host.aligned import aligned
+from onespp.render.host.aligned import owned
 from onespp.render.mitsuba.variant import mi
 
 from .camera_rays import camera_matrices
 from .path import trace
 from .sampler import FRAME_STREAM, GRADIENT_STREAM, keys_from_seed
-from .view import View
+from .view import Now, View
 
 STRATUM = 3          # pixels, side
 NO_SAMPLE = -1.0     # luminance where there is none
@@ -63,7 +63,7 @@ def _shade_both(view: View, index: int, previous: int,
     """Row and column in this frame, luminances (n, 2) now and before, of the samples seen."""
     stage, _ = view.stage, view.lights  # to find those moves the stage
     stage.set_frame(previous)
-    pixel = aligned(mi.UInt32, _picks(view.height, view.width, seed, previous))
+    pixel = owned(mi.UInt32, _picks(view.height, view.width, seed, previous))
     rays = view.rays()
     ray, _ = rays.at(*view.centres(pixel))
     with dr.suspend_grad():
@@ -72,10 +72,11 @@ def _shade_both(view: View, index: int, previous: int,
             dr.reinterpret_array(mi.UInt32, si.shape), si.prim_index)
     dr.eval(point, id_)
     old_places = stage.world_from_object()
-    old = _shade(view, previous, seed, pixel, point, id_)
+    keys = keys_from_seed(seed, FRAME_STREAM, previous)
+    old = view.replayed(_shade, view.now(keys), pixel, point, id_)
     stage.set_frame(index)
     point = _moved(point, id_, stage.stage_from_stage(old_places))
-    new = _shade(view, previous, seed, pixel, point, id_)
+    new = view.replayed(_shade, view.now(keys), pixel, point, id_)
 
     camera = camera_matrices(view.scene.camera, index, view.height, view.width,
                              view.jitter_at(index))
@@ -101,7 +102,7 @@ def _picks(height: int, width: int, seed: int, frame: int) -> np.ndarray:
 
 def _moved(point: mi.Point3f, id_: mi.Int32, matrices: np.ndarray) -> mi.Point3f:
     """Points moved with their objects; exactly what they were if those stand still."""
-    table = aligned(mi.Float, matrices[:, :3].astype(np.float32))
+    table = owned(mi.Float, matrices[:, :3].astype(np.float32))
     start = mi.UInt32(dr.maximum(id_, 0)) * 12
     rows = [[dr.gather(mi.Float, table, start + 4 * r + c) for c in range(4)] for r in range(3)]
     moved = mi.Point3f(*(dr.fma(a, point.x, dr.fma(b, point.y, dr.fma(c, point.z, d)))
@@ -110,22 +111,21 @@ def _moved(point: mi.Point3f, id_: mi.Int32, matrices: np.ndarray) -> mi.Point3f
     return moved
 
 
-def _shade(view: View, random_frame: int, seed: int, pixel: mi.UInt32, point: mi.Point3f,
-           id_: mi.Int32) -> _Shaded:
-    """What the camera of the posed frame sees at points, with a frame's random numbers."""
-    stage, scene = view.stage, view.stage.mi_scene
+def _shade(view: View, now: Now, pixel: mi.UInt32, point: mi.Point3f, id_: mi.Int32) -> _Shaded:
+    """What the camera of the posed frame sees at points."""
+    stage, scene = view.stage, now.scene
     with dr.suspend_grad():
-        origin = view.rays().origin
+        origin = now.rays.origin
         toward = point - origin
         distance = dr.norm(toward)
         ray = mi.Ray3f(origin, toward / distance)
         pi = scene.ray_intersect_preliminary(ray, coherent=True)
         met = stage.object_id(dr.reinterpret_array(mi.UInt32, pi.shape), pi.prim_index)
         seen = (id_ >= 0) & (met == id_) & (dr.abs(pi.t - distance) < TOLERANCE * distance)
-        sampler = view.new_sampler(keys_from_seed(seed, FRAME_STREAM, random_frame), pixel)
+        sampler = view.new_sampler(now.keys, pixel)
         radiance = trace(scene, ray, pi, sampler, view.scene.max_depth,
-                         view.candidates, view.lights_now, clear=stage.clear,
-                         mirrors=view.mirrors, balls=view.balls)
+                         view.candidates, now.lights, clear=stage.clear, mirrors=now.mirrors,
+                         balls=now.balls)
         shaded = _Shaded(mi.luminance(radiance.direct), mi.luminance(radiance.indirect), seen)
     dr.eval(shaded.direct, shaded.indirect, shaded.seen)
     return shaded

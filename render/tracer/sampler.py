@@ -15,7 +15,7 @@ from typing import ClassVar, Protocol
 import drjit as dr
 import numpy as np
 
-from onespp.render.host.aligned import aligned
+from onespp.render.host.aligned import owned
 from onespp.render.mitsuba.variant import mi
 
 from . import bluenoise
@@ -135,11 +135,12 @@ class BlueNoise:
                                     "key": mi.UInt32, "fine": mi.UInt32, "dimension": mi.UInt32}
 
     def __init__(self, keys: Keys | None = None, x: mi.UInt32 | None = None,
-                 y: mi.UInt32 | None = None) -> None:
+                 y: mi.UInt32 | None = None, mask: mi.UInt32 | None = None) -> None:
+        """mask: `mask_table`."""
         self.mask, self.x, self.y = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
         self.key, self.fine, self.dimension = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
         if keys is not None:
-            self.mask = aligned(mi.UInt32, bluenoise.mask().astype(np.uint32))
+            self.mask = mi.UInt32(mask)
             self.x, self.y = mi.UInt32(x), mi.UInt32(y)
             a, b = mi.sample_tea_32(keys[0], keys[1])
             self.key = mi.UInt32(a ^ b)
@@ -159,6 +160,11 @@ class BlueNoise:
     def next_2d(self) -> mi.Point2f:
         x = self.next_1d()
         return mi.Point2f(x, self.next_1d())
+
+
+def mask_table() -> mi.UInt32:
+    """The mask of `bluenoise.py`, row by row."""
+    return owned(mi.UInt32, bluenoise.mask().astype(np.uint32))
 
 
 def z_order(x: mi.UInt32, y: mi.UInt32) -> mi.UInt32:

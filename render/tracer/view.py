@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
+from weakref import ref
+
+import drjit as dr
 
 from onespp.render.errors import InputError
 from onespp.render.files.manifest import DIRECT, JITTERS, SAMPLERS
+from onespp.render.host.recorded import Recorded
 from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Scene
@@ -18,14 +23,30 @@ from .lights.candidates import candidates_for
 from .lights.mirrors import Mirrors, find_mirrors
 from .lights.resampling import Lights
 from .lights.scene_lights import find_lights
-from .sampler import BlueNoise, Keys, Pcg, Sampler, Sobol, z_order
+from .sampler import BlueNoise, Keys, Pcg, Sampler, Sobol, mask_table, z_order
 
-_SAMPLERS: dict[str, Callable[[Keys, Any, int], Sampler]] = {
-    "pcg": lambda keys, pixel, width: Pcg(keys, pixel),
-    "zsobol": lambda keys, pixel, width: Sobol(keys, mi.UInt32(0),
-                                               z_order(pixel % width, pixel // width)),
-    "bluenoise": lambda keys, pixel, width: BlueNoise(keys, pixel % width, pixel // width),
+_SAMPLERS: dict[str, Callable[[Keys, Any, int, Any], Sampler]] = {
+    "pcg": lambda keys, pixel, width, mask: Pcg(keys, pixel),
+    "zsobol": lambda keys, pixel, width, mask: Sobol(keys, mi.UInt32(0),
+                                                     z_order(pixel % width, pixel // width)),
+    "bluenoise": lambda keys, pixel, width, mask: BlueNoise(keys, pixel % width, pixel // width,
+                                                            mask),
 }
+
+
+@dataclass
+class Now:
+    """What the kernel of a frame reads: the scene as it stands, and its tables (`View.tables`);
+    keys of the random numbers; the camera's rays; and `lights_now`, `mirrors` and `balls` of the
+    view."""
+
+    scene: mi.Scene
+    tables: list[Any]
+    keys: Keys
+    rays: PixelRays
+    lights: Lights | None
+    mirrors: Mirrors | None
+    balls: Balls | None
 
 
 class View:
@@ -53,6 +74,7 @@ class View:
         self.scene, self.height, self.width = scene, height, width
         self.stage = MitsubaScene(scene)
         self._told: tuple[float | None, Lights] | None = None
+        self._recordings: dict[Callable[..., Any], Recorded] = {}
         self.candidates = 1 if direct == "mis" else candidates_for(self.stage.mi_scene)
 
     @property
@@ -74,6 +96,23 @@ class View:
             self._told = frame, self.lights.now(self.stage.mi_scene)
         return self._told and self._told[1]
 
+    def replayed(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """function(view, *arguments), recorded for this view where its scene can be.
+
+        (On a GPU it is called as it is: recordings of rays are untried there.)
+        """
+        if function not in self._recordings:
+            this = ref(self)  # or a recording would keep its view
+            self._recordings[function] = Recorded(
+                lambda *arguments: function(this(), *arguments),
+                enabled=self.stage.recordable and dr.backend_v(mi.Float) == dr.JitBackend.LLVM)
+        return self._recordings[function](*arguments)
+
+    def now(self, keys: Keys) -> Now:
+        """At the frame that the stage is set to, with these random numbers."""
+        return Now(self.stage.mi_scene, self.tables, keys, self.rays(), self.lights_now,
+                   self.mirrors, self.balls)
+
     @property
     def mirrors(self) -> Mirrors | None:
         """Those that light is looked for in, at the frame that the stage is set to."""
@@ -83,6 +122,15 @@ class View:
     def balls(self) -> Balls | None:
         """The same, of balls."""
         return find_balls(self.stage)
+
+    @property
+    def tables(self) -> list[Any]:
+        """What kernels read that is the same at all frames, beside the scene itself."""
+        return [*self.stage.tables, self._mask]
+
+    @cached_property
+    def _mask(self) -> mi.UInt32 | None:
+        return mask_table() if self.sampler == "bluenoise" else None
 
     @cached_property
     def _lights_change(self) -> bool:
@@ -104,7 +152,7 @@ class View:
 
     def new_sampler(self, keys: Keys, pixel: mi.UInt32) -> Sampler:
         """The random numbers of pixels."""
-        return _SAMPLERS[self.sampler](keys, pixel, self.width)
+        return _SAMPLERS[self.sampler](keys, pixel, self.width, self._mask)
 
     def centres(self, pixel: mi.UInt32) -> tuple[mi.Float, mi.Float]:
         """Screen coordinates (x, y) of pixels' centres, by index."""

@@ -38,7 +38,7 @@ from typing import Any
 
 import drjit as dr
 
-from onespp.render.host.aligned import aligned
+from onespp.render.host.aligned import owned
 from onespp.render.mitsuba.images import shape_index
 from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
@@ -154,8 +154,8 @@ def find_balls(stage: MitsubaScene) -> Balls | None:
     if not stage.images.round or stage.clear is not None:
         return None
     shapes, places, indices = stage.balls()
-    return Balls(aligned(mi.UInt32, shapes), aligned(mi.Float, places.ravel()),
-                 aligned(mi.Float, indices), stage.images.numbered(shapes), len(shapes))
+    return Balls(owned(mi.UInt32, shapes), owned(mi.Float, places.ravel()),
+                 owned(mi.Float, indices), stage.images.numbered(shapes), len(shapes))
 
 
 def _compared(near: mi.Float, is_first: mi.Bool) -> mi.UInt32:

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 import drjit as dr
 import numpy as np
 
-from onespp.render.host.aligned import aligned
+from onespp.render.host.aligned import owned
 from onespp.render.mitsuba.variant import mi
 
 from .reservoir import offered
@@ -61,10 +61,10 @@ class Clusters:
     def of(lights: list[np.ndarray], scales: np.ndarray) -> Clusters:
         """Of the words of each stratum's lights."""
         count = np.array([len(words) for words in lights])
-        return Clusters(aligned(mi.Float, scales.astype(np.float32)),
-                        aligned(mi.UInt32, (np.cumsum(count) - count).astype(np.uint32)),
-                        aligned(mi.UInt32, count.astype(np.uint32)),
-                        aligned(mi.UInt32, np.concatenate(lights).astype(np.uint32)))
+        return Clusters(owned(mi.Float, scales.astype(np.float32)),
+                        owned(mi.UInt32, (np.cumsum(count) - count).astype(np.uint32)),
+                        owned(mi.UInt32, count.astype(np.uint32)),
+                        owned(mi.UInt32, np.concatenate(lights).astype(np.uint32)))
 
 
 @dr.syntax

@@ -21,7 +21,7 @@ from typing import Any, cast
 import drjit as dr
 import numpy as np
 
-from onespp.render.host.aligned import aligned
+from onespp.render.host.aligned import owned
 from onespp.render.mitsuba.variant import mi
 
 from .clusters import Clusters
@@ -119,7 +119,7 @@ def middles_of(scene: mi.Scene, stratum: mi.UInt32, share: mi.Float,
         columns += [mi.Float(0)] * (_COLUMNS - len(columns))
     dr.eval(columns)
     table = np.stack([np.broadcast_to(column.numpy(), count) for column in columns], -1)
-    return Middles(aligned(mi.Float, table), tuple(sorted({*cast(Sequence[int], told)})))
+    return Middles(owned(mi.Float, table), tuple(sorted({*cast(Sequence[int], told)})))
 
 
 def _kind(emitter: mi.Emitter) -> int | None:

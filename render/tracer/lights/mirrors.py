@@ -30,7 +30,7 @@ from typing import Any
 
 import drjit as dr
 
-from onespp.render.host.aligned import aligned
+from onespp.render.host.aligned import owned
 from onespp.render.mitsuba.images import shape_index
 from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
@@ -82,7 +82,7 @@ def find_mirrors(stage: MitsubaScene) -> Mirrors | None:
     if not stage.images.flat or stage.clear is not None:
         return None
     shapes, planes = stage.flat_mirrors()
-    return Mirrors(aligned(mi.UInt32, shapes), aligned(mi.Float, planes.ravel()),
+    return Mirrors(owned(mi.UInt32, shapes), owned(mi.Float, planes.ravel()),
                    stage.images.numbered(shapes), len(shapes))
 
 

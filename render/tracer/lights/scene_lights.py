@@ -25,7 +25,7 @@ import drjit as dr
 import numpy as np
 
 from onespp.render.channels import MOST_GROUPS
-from onespp.render.host.aligned import aligned
+from onespp.render.host.aligned import owned
 from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.camera_rays import pixel_rays
@@ -89,8 +89,8 @@ def _in_strata(lights: np.ndarray, clusters: list[tuple[np.ndarray, float]],
     if count < len(lights):
         speaking = Clusters.of([word for of_cluster in words for word in of_cluster],
                                np.repeat([s for _, s in clusters], 4**halvings))
-    return (aligned(mi.UInt32, np.array(first, np.uint32)),
-            aligned(mi.UInt32, group.astype(np.uint32)), tuple(map(int, sizes)), speaking)
+    return (owned(mi.UInt32, np.array(first, np.uint32)),
+            owned(mi.UInt32, group.astype(np.uint32)), tuple(map(int, sizes)), speaking)
 
 
 def cut(luminances: np.ndarray, delta: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import drjit as dr
 import numpy as np
 
-from onespp.render.host.aligned import aligned
+from onespp.render.host.aligned import owned
 from onespp.render.mitsuba.variant import mi
 
 SUN_BIT = 128
@@ -105,7 +105,7 @@ def find_sun(scene: mi.Scene) -> Sun | None:
     row, column = _places(_SIDE * _FINER, _SIDE * _FINER)
     finer = sun.direction(row / (_SIDE * _FINER), column / (_SIDE * _FINER))
     cells = _luminances(environment, finer).reshape(_SIDE, _FINER, _SIDE, _FINER).mean((1, 3))
-    return replace(sun, shares=aligned(mi.UInt32, shared_out(cells.ravel())))
+    return replace(sun, shares=owned(mi.UInt32, shared_out(cells.ravel())))
 
 
 def _places(rows: int, columns: int) -> tuple[mi.Float, mi.Float]:

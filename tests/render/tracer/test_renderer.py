@@ -19,7 +19,7 @@ from onespp.scenes.transforms import look_at, rotate, scale, translate
 from tests.support.furnace import CORNERS, INWARD, furnace
 
 HEIGHT, WIDTH = 18, 24
-SIDE_BY_SIDE = 20  # operations, at most, of a kernel that lays the planes of a colour side by side
+SIDE_BY_SIDE = 80  # operations, at most, of the kernel that lays the planes of colours so
 
 
 def gray(value: float = 0.5) -> dict:
