@@ -8,37 +8,49 @@ import click
 
 from onespp.api.loading import load
 from onespp.render.host.memory import require_memory
+from onespp.scenes.description import LONGEST_PATH
 
 from .arguments import LARGEST_SIDE
 from .figures import json_option, show_or_print
 from .terminal import progress
 
+FRAMES = (f"{'scene':24} {'depth':>5} {'ms a frame':>10} {'path':>8} {'times':>6} {'aov':>8} "
+          f"{'times':>6}")
 HEADER = (f"{'scene':24} {'lights':>6} {'M':>2} {'variance':>9} {'time':>6} {'better':>7}        "
           f"{'s a render':>10}")
 
 
 @click.command("render")
-@click.argument("scene", default="box")
+@click.argument("scenes", nargs=-1, metavar="[SCENES]...")
 @click.option("--side", type=click.IntRange(1, LARGEST_SIDE), default=512, show_default=True,
               metavar="N", help="Pixels a side.")
+@click.option("--max-depth", type=click.IntRange(1, LONGEST_PATH), metavar="N",
+              help="Segments of the longest path; default the scene's.")
 @click.option("--repeats", type=click.IntRange(1, 1000), default=9, show_default=True, metavar="N",
               help="Frames that count.")
 @json_option
-def bench_render(scene: str, side: int, repeats: int, json_to: str | None) -> None:
-    """Time a frame of SCENE (a name, or a file), against mi.render with `aov` around `path`.
+def bench_render(scenes: tuple[str, ...], side: int, max_depth: int | None, repeats: int,
+                 json_to: str | None) -> None:
+    """Time a frame of SCENES against mi.render with `path`, alone and in `aov`.
 
-    All channels at 1 spp, in turns, after a warm-up; medians.
+    Names or files; default box. All channels at 1 spp, in turns, after a warm-up; medians. Columns:
+    the longest path; and how many times as long as theirs ours takes, the median of ratios.
     """
     require_memory(side, side)
     from onespp.render.study.frames import time_frames
 
-    ours, theirs = time_frames(load(scene), side, repeats)
-    ratios = [b / a for a, b in zip(ours, theirs)]
-    show_or_print({"scene": scene, "side": side, "ms": ours, "aov_ms": theirs,
-                   "median_ratio": median(ratios)}, json_to, lambda: click.echo(
-        f"{scene} {side}x{side}: {median(ours):.0f} ms, aov around path "
-        f"{median(theirs):.0f} ms, {median(ratios):.2f} times as long "
-        f"({min(ratios):.2f} to {max(ratios):.2f})"))
+    loaded, rows = [load(name) for name in scenes or ["box"]], []
+    if json_to != "-":
+        click.echo(FRAMES)
+    with progress() as report:
+        for scene in loaded:
+            row = time_frames(scene, side, repeats, max_depth, report)
+            rows.append(row)
+            if json_to != "-":
+                click.echo(f"{row.scene:24} {row.max_depth:5} {median(row.ms):10.1f} "
+                           f"{median(row.path_ms):8.1f} {row.times_as_long(row.path_ms):6.2f} "
+                           f"{median(row.aov_ms):8.1f} {row.times_as_long(row.aov_ms):6.2f}")
+    show_or_print(rows, json_to, lambda: None)
 
 
 @click.command("reference")

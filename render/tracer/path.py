@@ -37,6 +37,7 @@ from .sampler import Sampler, Sobol
 SHORT = 8  # segments, up to which paths end by themselves
 FIRST = 5  # segments after which roulette begins, as in Mitsuba
 _LIKELY = 0.95  # the largest probability to go on
+_BY_BALLS = 2  # vertices that look for light by way of balls: it costs more than later ones gain
 LARGEST_VISIBILITY = 1e4  # picks of 16 lights give up to 2560, as `resampling.py` weighs them
 
 
@@ -150,6 +151,8 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
             # (Not where some of it would be specular.)
             seeks = inner & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth) & (depth + 2 < longest)
             seeks &= (depth > 0) | ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Glossy)
+            if dr.hint(balls is not None, mode="scalar"):
+                seeks &= depth < _BY_BALLS
             if dr.hint(mirrors is not None, mode="scalar"):
                 sent += beta * light_in_mirrors(scene, si, sampler, mirrors, seeks)
             if dr.hint(balls is not None, mode="scalar"):

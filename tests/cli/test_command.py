@@ -233,7 +233,7 @@ def test_a_run_refuses_a_method_before_it_renders(call, scene_file, tmp_path, me
     assert not out.exists()
 
 
-@pytest.mark.parametrize("option", ["--side", "--repeats"])
+@pytest.mark.parametrize("option", ["--side", "--repeats", "--max-depth"])
 @pytest.mark.parametrize("value", ["0", "-3", "99999999"])
 def test_bench_render_refuses_what_cannot_be_timed(call, option, value):
     code, _, error = call("bench", "render", "box", option, value)

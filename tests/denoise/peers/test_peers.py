@@ -11,7 +11,7 @@ import pytest
 
 from onespp.denoise.catalog import METHODS, PEERS, build, parameters
 from onespp.denoise.peers import oidn
-from onespp.denoise.peers.oidn_split import OidnSplit
+from onespp.denoise.peers.oidn_split import OidnSplit, split
 from onespp.denoise.peers.temporal_oidn_split import TemporalOidnSplit
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
@@ -200,6 +200,14 @@ def test_what_is_in_unshadowed_light_stays_as_fine_as_it_is(name):
     plain = np.sqrt(np.mean((run("oidn-high", frame) - truth) ** 2))
     assert error < 0.08
     assert error < 0.35 * plain
+
+
+def test_what_visibility_has_above_1_is_in_the_rest_of_the_light():
+    frame, _ = split_frame(np.full((H, W), 1.5, np.float32))
+    visibility, rest = split(frame)
+    np.testing.assert_array_equal(visibility, 1)
+    light = frame["direct"] + frame["indirect"]
+    np.testing.assert_allclose(visibility * frame["unshadowed"] + rest, light, rtol=1e-6)
 
 
 @needs_oidn
