@@ -11,9 +11,12 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import drjit as dr
+
+_MOST = 8  # recordings of a function: of what is of another form each time, more would be kept
 
 
 class Recorded:
@@ -25,25 +28,65 @@ class Recorded:
     """
 
     def __init__(self, function: Callable[..., Any], enabled: bool = True) -> None:
-        self._function, self._calls, self._enabled = function, 0, enabled
-        self._frozen: Any = dr.freeze(function, warn_after=1000)
+        given = _Given()
+        self._function, self._given, self._enabled = function, given, enabled
+        self._frozen: Any = dr.freeze(lambda *_: function(*given.arguments), limit=_MOST,
+                                      warn_after=1000, state_fn=lambda *_: given.form)
 
-    def __call__(self, *arguments: Any) -> Any:
-        self._calls += 1
-        if self._enabled and self._calls > 1:
+    def __call__(self, scene: Any, *arguments: Any) -> Any:
+        """function(*arguments); scene: the Mitsuba scene that it reads.
+
+        Arguments are Dr.Jit arrays, values that can be hashed, and tuples, lists and dataclasses of
+        them; the result, Dr.Jit arrays in tuples, lists and dictionaries.
+        """
+        given = self._given
+        if self._enabled and given.before:
+            arrays: list[Any] = []
+            given.arguments, given.form = arguments, _form(arguments, arrays)
             try:
                 with no_collection():
-                    return self._frozen(*arguments)
-            except RuntimeError as error:  # of Dr.Jit, or one of the function's that it wraps
+                    return self._frozen(scene, arrays)
+            except RuntimeError as error:  # it wraps others, also an interrupt
                 if not str(error).startswith("record()"):
                     raise
+                if error.__cause__ and not isinstance(error.__cause__, RuntimeError):
+                    raise error.__cause__ from None
                 self._enabled = False
+            finally:
+                given.arguments = ()
+        given.before = True
         return self._function(*arguments)
 
     @property
     def recordings(self) -> int:
         """How many there are; 0 where there can be none."""
         return self._frozen.n_recordings if self._enabled else 0
+
+
+class _Given:
+    """The arguments of the call that is being made, their form, and whether there was one before.
+
+    Dr.Jit does not look into it. It holds a lock while it walks the arguments that it is given
+    itself, so those are a list: to walk a dataclass is to run Python, which may have to wait for
+    another thread that waits for the lock to let an array go.
+    """
+
+    arguments: tuple[Any, ...] = ()
+    form: tuple[Any, ...] = ()
+    before = False
+
+
+def _form(value: Any, arrays: list[Any]) -> Any:
+    """Of a structure, what is no array; those are appended to `arrays`."""
+    kind = type(value)
+    if dr.is_array_v(kind):
+        arrays.append(value)
+        return kind
+    if is_dataclass(value):
+        return kind, *(_form(getattr(value, field.name), arrays) for field in fields(value))
+    if kind in (tuple, list):
+        return kind, *(_form(part, arrays) for part in value)
+    return value
 
 
 @contextmanager

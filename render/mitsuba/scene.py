@@ -8,6 +8,8 @@ Traps that this file exists for:
   at frame 0): a scene far from the world's origin renders as well as one at it;
 - a ray starts 1.5e-4 (1 + distance from the origin) above its surface, more than a tiny scene is
   wide, so everything is divided by `unit`, a power of two that is 1 but in small scenes;
+- at every update Mitsuba turns the normals of balls and cylinders that are mirrored once more, and
+  tells the sky of the scene's size before it has taken that anew;
 - Mitsuba inverts matrices, so what is scaled to nothing is placed as a dot too small to be hit.
 """
 
@@ -41,6 +43,7 @@ from .variant import check_variant, mi
 
 _SMALL = 0.125   # a scene that reaches less far has a unit of its own
 _SHEARED = 1e-4  # how far axes may be from perpendicular, as a cosine
+_MIRROR = np.diag([-1.0, 1, 1, 1])
 _DOT = 1e-7      # half the size of what has none, in stage units
 
 _ANALYTIC = {Sphere: "sphere", Rectangle: "rectangle", Disk: "disk", Cylinder: "cylinder"}
@@ -90,6 +93,7 @@ class MitsubaScene:
                 f"light {i} of scene '{description.name}'")
         self.mi_scene = mi.load_dict(scene, parallel=False, optimize=False)
         self._parameters = mi.traverse(self.mi_scene)
+        self._by_name = {shape.id(): shape for shape in self.mi_scene.shapes()}
         self.id_from_registry, self._id_from_face = self._registry_table(together)
         self._still = np.stack([shape.world_from_object_at(frame) for shape in description.shapes])
         self._move(frame)  # an updated scene differs from a loaded one by roundings of its rays
@@ -105,13 +109,43 @@ class MitsubaScene:
         places = [(shape, shape.world_from_object_at(frame)) for shape in shapes if shape.moves]
         lights = [(shape, shape.emission_at(frame)) for shape in shapes if callable(shape.emission)]
         check_variant()
+        self.frame = float("nan")  # whatever interrupts it: it is at no frame
         for shape, place in places:
             self._place(shape, place)
         for shape, radiance in lights:
             key = f"{self._ids[shape.name]}.emitter.radiance.value"
             self._parameters[key] = dr.opaque(mi.Color3f, radiance)
         self._parameters.update()
+        self._set_normals(places)
+        if self.mi_scene.environment() is not None:
+            self.mi_scene.environment().set_scene(self.mi_scene)
         self.frame = frame
+
+    def _set_normals(self, places: Sequence[tuple[Shape, np.ndarray]]) -> None:
+        """Turn those of balls and cylinders as a scene that was loaded so would have them."""
+        wrong = []
+        for shape, place in places:
+            if isinstance(shape.geometry, Sphere | Cylinder):
+                is_mirrored = _mirrors(_checked(shape, self._local(place)))
+                now = self._by_name[self._ids[shape.name]].has_flipped_normals()
+                if now != (shape.geometry.flipped != is_mirrored):
+                    wrong.append((shape, place, is_mirrored))
+        for shape, place, is_mirrored in wrong:
+            self._place(shape, place if is_mirrored else place @ _MIRROR)
+        if wrong:
+            self._parameters.update()
+        if back := [(shape, place) for shape, place, is_mirrored in wrong if not is_mirrored]:
+            for shape, place in back:
+                self._place(shape, place)
+            self._parameters.update()
+
+    @property
+    def turned(self) -> tuple[bool, ...]:
+        """Of the balls and cylinders that move, whether their normals are turned, at the current
+        frame: no array, so that kernels hold it."""
+        return tuple(self._by_name[self._ids[shape.name]].has_flipped_normals()
+                     for shape in self.description.shapes
+                     if shape.moves and isinstance(shape.geometry, Sphere | Cylinder))
 
     def world_from_image(self) -> np.ndarray:
         """(n, 4, 4) float64 by ID of objects and of their images, at the current frame."""

@@ -27,7 +27,7 @@ from onespp.render.channels import (
 from onespp.render.errors import InputError
 from onespp.render.frame import Frame
 from onespp.render.host.turns import turn
-from onespp.render.mitsuba.variant import mi
+from onespp.render.mitsuba.variant import check_variant, mi
 
 from .camera_rays import camera_matrices
 from .gbuffer import GBUFFER, PrimaryHit
@@ -69,6 +69,7 @@ class Renderer(View):
         are rendered: the channels of `replay.py` replay frame `index` - 1, whether or not it is
         asked for, and frame 0 has nothing to replay.
         """
+        check_variant()
         if not self.splits and set(channels) & {*SPLIT, *SHADOW}:
             raise InputError(f"the channels {', '.join(SPLIT + SHADOW)} need --direct resampled "
                              "and a scene of max_depth 2 or more")
@@ -85,12 +86,12 @@ class Renderer(View):
                              f"'{self.scene.name}' is not: leave it out")
         before = index - 1 if index > 0 else None
         replayed = replay(self, index, before, seed) if set(channels) & set(REPLAY) else {}
-        if set(channels) & _TRACED:
+        if traced := bool(set(channels) & _TRACED):
             _ = self.lights  # before the stage is set: to find them moves it
         self.stage.set_frame(index)
         keys = keys_from_seed(seed, FRAME_STREAM, index)
         planes = self.replayed(Renderer._planes, tuple(c for c in channels if c not in REPLAY),
-                               self.now(keys))
+                               self.now(keys, traced))
         matrices = camera_matrices(self.scene.camera, index, self.height, self.width,
                                    self.jitter_at(index))
         images = {name: self._image(value) for name, value in planes.items()}
@@ -126,7 +127,7 @@ class Renderer(View):
 
     def _trace_frame(self, channels: Sequence[str], now: Now) -> dict[str, Any]:
         with dr.suspend_grad():
-            scene = now.scene
+            scene = self.stage.mi_scene
             pixel = dr.arange(mi.UInt32, self.height * self.width)
             ray, depth_per_length = now.rays.at(*self.centres(pixel))
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
@@ -190,7 +191,7 @@ class Renderer(View):
     def _with_layers(self, radiance: Radiance, behind: Replaced, sampler: Sampler,
                      now: Now) -> Radiance:
         """Light with that of other layers: their lamps, and of one of them the rest, specular."""
-        scene, layer, aside = now.scene, behind.other, behind.aside
+        scene, layer, aside = self.stage.mi_scene, behind.other, behind.aside
         assert layer is not None
         assert aside is not None
         pi = scene.ray_intersect_preliminary(layer.ray, coherent=False,

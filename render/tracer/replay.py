@@ -73,10 +73,10 @@ def _shade_both(view: View, index: int, previous: int,
     dr.eval(point, id_)
     old_places = stage.world_from_object()
     keys = keys_from_seed(seed, FRAME_STREAM, previous)
-    old = view.replayed(_shade, view.now(keys), pixel, point, id_)
+    old = _Shaded(*view.replayed(_shade, view.now(keys), pixel, point, id_))
     stage.set_frame(index)
     point = _moved(point, id_, stage.stage_from_stage(old_places))
-    new = view.replayed(_shade, view.now(keys), pixel, point, id_)
+    new = _Shaded(*view.replayed(_shade, view.now(keys), pixel, point, id_))
 
     camera = camera_matrices(view.scene.camera, index, view.height, view.width,
                              view.jitter_at(index))
@@ -111,9 +111,10 @@ def _moved(point: mi.Point3f, id_: mi.Int32, matrices: np.ndarray) -> mi.Point3f
     return moved
 
 
-def _shade(view: View, now: Now, pixel: mi.UInt32, point: mi.Point3f, id_: mi.Int32) -> _Shaded:
-    """What the camera of the posed frame sees at points."""
-    stage, scene = view.stage, now.scene
+def _shade(view: View, now: Now, pixel: mi.UInt32, point: mi.Point3f,
+           id_: mi.Int32) -> tuple[mi.Float, mi.Float, mi.Bool]:
+    """What the camera of the posed frame sees at points: as `_Shaded`."""
+    stage, scene = view.stage, view.stage.mi_scene
     with dr.suspend_grad():
         origin = now.rays.origin
         toward = point - origin
@@ -126,6 +127,6 @@ def _shade(view: View, now: Now, pixel: mi.UInt32, point: mi.Point3f, id_: mi.In
         radiance = trace(scene, ray, pi, sampler, view.scene.max_depth,
                          view.candidates, now.lights, clear=stage.clear, mirrors=now.mirrors,
                          balls=now.balls)
-        shaded = _Shaded(mi.luminance(radiance.direct), mi.luminance(radiance.indirect), seen)
-    dr.eval(shaded.direct, shaded.indirect, shaded.seen)
+        shaded = mi.luminance(radiance.direct), mi.luminance(radiance.indirect), seen
+    dr.eval(shaded)
     return shaded

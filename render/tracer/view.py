@@ -36,12 +36,12 @@ _SAMPLERS: dict[str, Callable[[Keys, Any, int, Any], Sampler]] = {
 
 @dataclass
 class Now:
-    """What the kernel of a frame reads: the scene as it stands, and its tables (`View.tables`);
-    keys of the random numbers; the camera's rays; and `lights_now`, `mirrors` and `balls` of the
-    view."""
+    """What the kernel of a frame reads beside the Mitsuba scene: `tables` of the view, and `turned`
+    of the stage; keys of the random numbers; the camera's rays; and `lights_now`, `mirrors` and
+    `balls` of the view, None where nothing is traced."""
 
-    scene: mi.Scene
     tables: list[Any]
+    turned: tuple[bool, ...]
     keys: Keys
     rays: PixelRays
     lights: Lights | None
@@ -106,12 +106,17 @@ class View:
             self._recordings[function] = Recorded(
                 lambda *arguments: function(this(), *arguments),
                 enabled=self.stage.recordable and dr.backend_v(mi.Float) == dr.JitBackend.LLVM)
-        return self._recordings[function](*arguments)
+        return self._recordings[function](self.stage.mi_scene, *arguments)
 
-    def now(self, keys: Keys) -> Now:
-        """At the frame that the stage is set to, with these random numbers."""
-        return Now(self.stage.mi_scene, self.tables, keys, self.rays(), self.lights_now,
-                   self.mirrors, self.balls)
+    def now(self, keys: Keys, traced: bool = True) -> Now:
+        """At the frame that the stage is set to, with these random numbers.
+
+        Args:
+            traced: whether paths are; then `lights` are to be known, as to find them moves the
+                stage.
+        """
+        found = (self.lights_now, self.mirrors, self.balls) if traced else (None, None, None)
+        return Now(self.tables, self.stage.turned, keys, self.rays(), *found)
 
     @property
     def mirrors(self) -> Mirrors | None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import gc
+from unittest.mock import Mock
 from weakref import ref
 
+import drjit as dr
 import numpy as np
 import pytest
 
@@ -75,6 +77,16 @@ def scene(*shapes: Shape, lights: tuple[Light, ...] = (), environment=None) -> S
                  environment=environment, lights=lights)
 
 
+def mirrored(f):
+    """Of a thing that is mirrored in every second frame."""
+    return translate((0.2 * f, 1.5, 1)) @ np.diag([(-0.4, 0.4)[int(f) % 2], 0.4, 0.4, 1.0])
+
+
+def far_away(f):
+    """Of a thing that makes the scene larger and smaller."""
+    return translate((5.0 + 7 * (f % 3), 0.5, 0))
+
+
 def things(surfaces, geometry=None) -> list[Shape]:
     return [Shape(f"thing_{i}", geometry or quad(), surface, place(i))
             for i, surface in enumerate(surfaces)]
@@ -105,6 +117,11 @@ SCENES = {
     "points": scene(*things([GRAY], Sphere()), lights=POINTS),
     "even sky": scene(*things([GRAY], Sphere()), environment=(0.2, 0.3, 0.4)),
     "sky with a sun": scene(*things([GRAY], Sphere()), environment=SUNNY),
+    "sky that is far": scene(Shape("ball", Sphere(), GRAY, far_away), environment=SUNNY),
+    "points that are far": scene(Shape("ball", Sphere(), GRAY, far_away), lights=POINTS),
+    "mirrored lamps": scene(
+        Shape("ball", Sphere(), diffuse((0, 0, 0)), mirrored, (3.0, 2.0, 1.0)),
+        Shape("rod", Cylinder(flipped=True), diffuse((0, 0, 0)), mirrored, (1.0, 2.0, 1.0))),
     "foliage": catalog.load("hard/foliage"),
     "glass ball": catalog.load("hard/glass-ball"),
     "many lights": catalog.load("generated/0"),
@@ -122,7 +139,8 @@ def test_they_are_the_same_to_the_bit(name, sampler, monkeypatch):
     renderer = Renderer(SCENES[name], HEIGHT, WIDTH, direct="resampled", sampler=sampler)
     names = (*renderer.channels, *REPLAY)
     replayed = frames(renderer, names)
-    assert [r.recordings for r in renderer._recordings.values()] == [1, 1]
+    recordings = 2 if name == "mirrored lamps" else 1
+    assert [r.recordings for r in renderer._recordings.values()] == [recordings] * 2
     monkeypatch.setattr(View, "replayed", lambda view, function, *rest: function(view, *rest))
     traced = frames(Renderer(SCENES[name], HEIGHT, WIDTH, direct="resampled", sampler=sampler),
                     names)
@@ -135,6 +153,7 @@ def test_a_mesh_that_shines_as_a_picture_and_moves_is_not_recorded():
     one that is gone, which ends the process."""
     renderer = Renderer(scene(*lamps(quad(), emission=PICTURE)), HEIGHT, WIDTH)
     frames(renderer, renderer.channels)
+    assert not renderer.stage.recordable
     assert [r.recordings for r in renderer._recordings.values()] == [0]
 
 
@@ -156,3 +175,66 @@ def test_recordings_keep_no_renderer():
     del renderer
     gc.collect()
     assert kept() is None
+
+
+@pytest.mark.parametrize("name", ["sky that is far", "mirrored lamps"])
+def test_frames_do_not_depend_on_those_before(name):
+    """Mitsuba tells the sky how large the scene was before it moved, and turns the normals of what
+    is mirrored at every update."""
+    renderer = Renderer(SCENES[name], HEIGHT, WIDTH, direct="resampled")
+    for index, frame in zip(FRAMES, frames(renderer, renderer.channels)):
+        alone = Renderer(SCENES[name], HEIGHT, WIDTH, direct="resampled").frame(
+            index, 3, renderer.channels)
+        assert [c for c in renderer.channels if frame[c].tobytes() != alone[c].tobytes()] == []
+        if name == "mirrored lamps":
+            assert renderer.stage.turned == tuple(
+                lamp.geometry.flipped != bool(np.linalg.det(lamp.world_from_object_at(
+                    renderer.stage.frame)) < 0) for lamp in SCENES[name].shapes if lamp.emission)
+
+
+def test_guides_alone_are_of_their_frame():
+    """To find many lights moves the stage."""
+    many = scene(*lamps(*[Rectangle()] * 6))
+    alone, after = (Renderer(many, HEIGHT, WIDTH, direct="resampled") for _ in range(2))
+    assert after.lights is not None
+    one, other = (r.frame(1, 3, ("depth", "normal")) for r in (alone, after))
+    assert alone.stage.frame == 1
+    assert one["depth"].tobytes() == other["depth"].tobytes()
+
+
+@pytest.mark.parametrize("raised", [KeyboardInterrupt, TimeoutError, MemoryError])
+def test_what_is_raised_while_a_frame_is_recorded_is_raised(raised, monkeypatch):
+    renderer = Renderer(SCENES["points"], HEIGHT, WIDTH)
+    expected = renderer.frame(0, 3)
+    with monkeypatch.context() as patch:
+        patch.setattr(renderer, "_trace_frame", Mock(side_effect=raised("stop")))
+        with pytest.raises(raised, match="stop"):
+            renderer.frame(0, 3)
+    for _ in range(2):
+        assert renderer.frame(0, 3)["color"].tobytes() == expected["color"].tobytes()
+    assert [r.recordings for r in renderer._recordings.values()] != [0]
+
+
+def test_a_move_that_is_interrupted_is_made_again(monkeypatch):
+    renderer = Renderer(SCENES["surfaces"], HEIGHT, WIDTH)
+    expected = renderer.frame(0, 3)
+    with monkeypatch.context() as patch:
+        patch.setattr(renderer.stage, "_set_normals", Mock(side_effect=KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            renderer.frame(2, 3)
+    assert renderer.frame(0, 3)["color"].tobytes() == expected["color"].tobytes()
+
+
+def test_dr_jit_walks_arrays_alone():
+    """It holds a lock while it walks what a recording is given: had it to run Python for that, as
+    for a dataclass, it could wait for a thread that waits for the lock, with the interpreter's."""
+    renderer = Renderer(SCENES["points"], HEIGHT, WIDTH)
+    frames(renderer, renderer.channels)
+    recording, = renderer._recordings.values()
+    recording._frozen = Mock(wraps=recording._frozen)
+    frames(renderer, renderer.channels)
+    for given in recording._frozen.call_args_list:
+        scene, arrays = given.args
+        assert scene is renderer.stage.mi_scene
+        assert type(arrays) is list
+        assert all(dr.is_array_v(type(array)) for array in arrays)
