@@ -8,9 +8,9 @@ albedo 1 and the normals; R' its result for R, with albedo and normals. U has no
 texture and shading of direct light stay as they are, as in our own methods: what these are ahead of
 this one is not owed to the split.
 
-V is capped at 1 and what is above is left in R. (That is the best for the network: with 1.1, as in
-`inputs/signals.py`, it loses 0.03 to 0.6 dB in scenes that neither was chosen on.) A frame that
-lacks the split is denoised as `Oidn` does it.
+V is capped at 1 and what is above is left in R. (With 1.1, as in `inputs/signals.py`, the network
+loses 0.03 to 0.6 dB in development scenes; neither is better everywhere.) A frame that lacks the
+split is denoised as `Oidn` does it.
 """
 
 from __future__ import annotations
