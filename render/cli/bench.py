@@ -14,10 +14,10 @@ from .arguments import LARGEST_SIDE
 from .figures import json_option, show_or_print
 from .terminal import progress
 
-FRAMES = (f"{'scene':24} {'depth':>5} {'ms a frame':>10} {'path':>8} {'times':>6} {'aov':>8} "
-          f"{'times':>6}")
-HEADER = (f"{'scene':24} {'lights':>6} {'M':>2} {'variance':>9} {'time':>6} {'better':>7}        "
-          f"{'s a render':>10}")
+FRAME_HEADER = (f"{'scene':24} {'depth':>5} {'ms a frame':>10} {'path':>8} {'times':>6} {'aov':>8} "
+                f"{'times':>6}")
+REFERENCE_HEADER = (f"{'scene':24} {'lights':>6} {'M':>2} {'variance':>9} {'time':>6} "
+                    f"{'better':>7}        {'s a render':>10}")
 
 
 @click.command("render")
@@ -41,7 +41,7 @@ def bench_render(scenes: tuple[str, ...], side: int, max_depth: int | None, repe
 
     loaded, rows = [load(name) for name in scenes or ["box"]], []
     if json_to != "-":
-        click.echo(FRAMES)
+        click.echo(FRAME_HEADER)
     with progress() as report:
         for scene in loaded:
             row = time_frames(scene, side, repeats, max_depth, report)
@@ -80,7 +80,7 @@ def bench_reference(scenes: tuple[str, ...], pixels: int, spp: int, repeats: int
     for height, width in sizes:
         require_memory(height, width)
     if json_to != "-":
-        click.echo(HEADER)
+        click.echo(REFERENCE_HEADER)
     rows = []
     with progress() as report:
         for scene, (height, width) in zip(loaded, sizes):

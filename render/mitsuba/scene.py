@@ -234,11 +234,10 @@ class MitsubaScene:
         """Whether what its kernels read is where it was when a frame is set, or in `tables` and the
         parameters of `mi_scene`: not if a mesh that shines as a picture moves, as Mitsuba then
         traces rays through another scene of its uv (`pictured_lamps.py`)."""
-        moving = {self._ids[shape.name] for shape in self.description.shapes
-                  if shape.moves and isinstance(shape.geometry, Mesh)}
-        return not any(shape.id() in moving and shape.is_emitter() and mi.has_flag(
-            shape.emitter().flags(), mi.EmitterFlags.SpatiallyVarying)
-            for shape in self.mi_scene.shapes())
+        lamps = [self._by_name[self._ids[shape.name]].emitter() for shape in self.description.shapes
+                 if shape.moves and shape.emission is not None and isinstance(shape.geometry, Mesh)]
+        return not any(mi.has_flag(lamp.flags(), mi.EmitterFlags.SpatiallyVarying)
+                       for lamp in lamps)
 
     @cached_property
     def bent_glass(self) -> mi.UInt32 | None:

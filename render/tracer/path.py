@@ -37,7 +37,8 @@ from .sampler import Sampler, Sobol
 SHORT = 8  # segments, up to which paths end by themselves
 FIRST = 5  # segments after which roulette begins, as in Mitsuba
 _LIKELY = 0.95  # the largest probability to go on
-_BY_BALLS = 2  # vertices that look for light by way of balls: it costs more than later ones gain
+_BY_BALLS = 2  # where there are balls, vertices that look for light by way of them and of mirrors:
+               # what later ones gain is not worth their time
 LARGEST_VISIBILITY = 1e4  # picks of 16 lights give up to 2560, as `resampling.py` weighs them
 
 

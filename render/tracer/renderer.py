@@ -119,7 +119,7 @@ class Renderer(View):
         return self._image(dr.ravel(color))
 
     def _planes(self, channels: Sequence[str], now: Now) -> dict[str, Any]:
-        """Evaluated, those of a color side by side."""
+        """`_trace_frame`, evaluated, the planes of a colour side by side."""
         planes = self._trace_frame(channels, now)
         dr.eval(planes)
         return {name: dr.ravel(plane) if dr.depth_v(plane) > 1 else plane

@@ -22,6 +22,8 @@ direction that arrives at y and n the normal there. Weights of multiple importan
 that one, and a sampled direction that comes by one ball to a light is weighed likewise: where ways
 run together it is of no use, and weighs nothing.
 
+Of a frame's path the first vertices alone look for it (`path.py`), of a reference's all.
+
 Balls are spheres of smooth glass without maps, denser than what is around them, and of smooth
 metal. What is reflected inside of them, or comes by two, is left to chance, and all in scenes in
 which shadow rays go through something (`panes.py`); points that shine are not looked for, which

@@ -27,7 +27,7 @@ def test_times_as_long_are_the_median_of_ratios():
     assert row.times_as_long(row.aov_ms) == 2
 
 
-def test_several_scenes_have_a_row_each_and_figures(tmp_path):
+def test_several_scenes_have_a_row_each_and_figures():
     done = CliRunner().invoke(app, ["bench", "render", "box", "hard/mirror", "--side", "16",
                                     "--repeats", "1", "--max-depth", "4", "--json", "-"])
     assert done.exit_code == 0, done.output

@@ -66,6 +66,17 @@ def test_every_channel_has_the_mean_that_it_has_without(floor, monkeypatch):
     assert_same_light(ours, rendered(1000))
 
 
+def test_what_later_vertices_leave_to_chance_is_whole():
+    """A lamp behind a ball lights a white room: later vertices of a frame's path look for nothing,
+    those of a reference's do."""
+    around = Shape("around", Sphere(flipped=True), diffuse((0.8, 0.8, 0.8)), scale(4))
+    renderer = Renderer(scene(ball("glass", glass(), 0.4, 1.25, 0.2, 0.5), around, size=0.3,
+                              floor=diffuse((0.8, 0.8, 0.8)), depth=8), HEIGHT, WIDTH)
+    frames = [renderer.frame(0, k, ("color",))["color"].mean((0, 1)) for k in range(200)]
+    truth = [renderer.sample_sum(0, 1, k, 64).mean((0, 1)) / 64 for k in range(12)]
+    assert_same_mean(*mean_and_variance(frames), *mean_and_variance(truth))
+
+
 @pytest.mark.parametrize(("material", "depth"), [(glass(), 4), (mirror(), 3)])
 def test_a_small_lamp_makes_no_fireflies(material, depth):
     renderer = Renderer(scene(ball("ball", material, 0.2, 0.9, 0, 0.3), size=0.02, depth=depth),
