@@ -89,7 +89,7 @@ def _rgb(layer: str) -> tuple[str, ...]:
 
 MOST_GROUPS = 4  # of lights, each with a visibility of its own
 SUN = -2  # `light_id` of the environment's brightest spot, where it is a light of its own
-TRACING = 10
+TRACING = 11
 """Counts the changes of what frames hold. Raise it whenever the same scene, frame and seed give
 other values than rounding explains in any channel, of frames or references: sequences and data sets
 begun before are then not continued. One number serves both, since what changes the mean of light
@@ -102,9 +102,10 @@ under half-open masks mirrors and glass show lamps; the sun of a sky is a light 
 5: of several lights, lamps count in direct light as if they were picked for sure (`strata.py`).
 6: where lobes are narrow, unshadowed light has nothing of the sky (`resampling.py`).
 7: shadow rays go through masks and panes, and light is looked for in flat mirrors (`mirrors.py`).
-8: light is looked for by way of smooth balls (`balls.py`).
+8: light is looked for by way of smooth balls (`lights/balls/`).
 9: lamps have no noise after two turns inside of bent glass (`layers.py`).
 10: later vertices of a frame's path leave light by way of balls to chance (`path.py`).
+11: frames' first vertices look for lights in directions toward balls, too (`lights/balls/`).
 """
 
 _ROWS = (

@@ -5,7 +5,7 @@ solid angle; `depth`, segments behind the current vertex.
 
 The estimator has the mean of Mitsuba's `path`, and less noise: a vertex may compare several points
 of the lights (`candidates.py`), looks for light through masks and panes (`panes.py`), in flat
-mirrors (`mirrors.py`) and by way of balls (`balls.py`), and there is Russian roulette only where
+mirrors (`mirrors.py`) and by way of balls (`balls/`), and there is Russian roulette only where
 paths may have more than `SHORT` segments: shorter ones cost little, and all that arrives counts. It
 differs in what it returns:
 radiance split by the number of scattering events, from one primary hit that the G-buffer shares;
@@ -26,7 +26,8 @@ from onespp.render.mitsuba.images import shape_index
 from onespp.render.mitsuba.variant import mi
 
 from .layers import Course
-from .lights.balls import Balls, light_by_balls
+from .lights.balls.balls import Balls
+from .lights.balls.light import light_by_balls
 from .lights.candidates import sought_light
 from .lights.mirrors import Mirrors, light_in_mirrors
 from .lights.origin import Origin, found_light
@@ -49,7 +50,7 @@ class Radiance:
     specular: the part of `indirect` that left the first hit through a glossy or mirror lobe.
     hit_distance: from the first hit to the next, 0 if there is none. hit_shape: the shape met
     there, its index in the JIT registry, 0 if there is none; hit_face: which of its faces.
-    caustic: the part of `indirect` that comes to the first hit by one ball (`lights/balls.py`),
+    caustic: the part of `indirect` that comes to the first hit by one ball (`lights/balls/`),
     None where there are none.
     straight: the part of all of it that straight paths found (`layers.py`), if that was asked for.
     `unshadowed`, `visibility` and `shadow_ray` are there if direct light was resampled: see
@@ -258,8 +259,8 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
             if dr.hint(mirrors is not None, mode="scalar"):
                 total += beta * light_in_mirrors(scene, si, numbers, mirrors, seeks)
             if dr.hint(balls is not None, mode="scalar"):
-                total += beta * light_by_balls(scene, si, numbers, balls, mi.Bool(False),
-                                               max_depth - depth, seeks)
+                total += beta * light_by_balls(scene, si, numbers, balls, None, max_depth - depth,
+                                               seeks)
         bsdf_sample, bsdf_weight = bsdf.sample(mi.BSDFContext(), si, numbers.next_1d(),
                                                numbers.next_2d(), running)
         onward = si.spawn_ray(si.to_world(bsdf_sample.wo))

@@ -18,7 +18,7 @@ from onespp.render.mitsuba.variant import mi
 from onespp.scenes.description import Scene
 
 from .camera_rays import NO_JITTER, Offset, PixelRays, halton, pixel_rays
-from .lights.balls import Balls, find_balls
+from .lights.balls.balls import Balls, find_balls
 from .lights.candidates import candidates_for
 from .lights.mirrors import Mirrors, find_mirrors
 from .lights.resampling import Lights

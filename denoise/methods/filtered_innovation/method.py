@@ -83,7 +83,7 @@ LARGE = 640**2            # pixels of an image whose last filter has a level mor
 _UNDER_MOVING_LIGHTS = 0.9  # `sharp_min_gain`
 _IN_STILL_WORLD = 0.5     # times `min_gain`
 _LIGHTS_AT_REST = 4.0     # times `noise_threshold`, of diffuse light
-_PATTERN_LEVELS = 3, 2    # of light by way of balls: `innovation_levels`, `output_levels`
+_PATTERN_LEVELS = 2, 2    # of light by way of balls: `innovation_levels`, `output_levels`
 _LEAST_SHARE = 1e-4       # that `expected_change` is divided by
 _BACKGROUND_SCALE = 1e3   # of 1/z of background and lamps: only their like counts
 

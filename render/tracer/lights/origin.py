@@ -3,7 +3,7 @@
 Weights of multiple importance sampling are of a vertex and a direction. What a path does on its way
 without being turned by chance changes neither: straight on through a mask or a pane (`panes.py`) it
 has left the same vertex in the same direction; by a flat mirror (`mirrors.py`) it has left that
-vertex's image; by a ball (`balls.py`) light sampling has a density of its own.
+vertex's image; by a ball (`balls/`) light sampling has a density of its own.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import drjit as dr
 
 from onespp.render.mitsuba.variant import mi
 
-from .balls import Balls
+from .balls.balls import Balls
 from .mirrors import Mirrors
 from .panes import goes_through
 from .strata import power_heuristic
@@ -147,8 +147,9 @@ def found_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, origin: Origin,
     emitter_pdf = scene.pdf_emitter_direction(reference, hit, ~origin.from_delta)
     if origin.share is not None:
         surer = surer * origin.share
+    density = surer * emitter_pdf
     if balls is not None:
         assert by is not None
-        surer = dr.select(bent, balls.share_of_pdf(origin.p, hit, si, by.ball - 1, by.sine,
-                                                   by.refracted, bent, by.is_first), surer)
-    return power_heuristic(origin.pdf, surer * emitter_pdf) * hit.emitter.eval(si)
+        density = dr.select(bent, balls.density(origin.p, hit, si, emitter_pdf, by.ball - 1,
+                                                by.sine, by.refracted, by.is_first, bent), density)
+    return power_heuristic(origin.pdf, density) * hit.emitter.eval(si)

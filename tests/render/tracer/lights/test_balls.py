@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+import drjit as dr
 import numpy as np
 import pytest
 
@@ -12,7 +13,7 @@ from onespp.render.channels import CAUSTIC
 from onespp.render.errors import InputError
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer import view
-from onespp.render.tracer.lights.balls import _solved, _Ways
+from onespp.render.tracer.lights.balls.ways import Ways, solved, through
 from onespp.render.tracer.renderer import Renderer
 from onespp.scenes.description import Camera, Rectangle, Scene, Shape, Sphere
 from onespp.scenes.materials import diffuse, glass, metal, mirror, pane, varnish
@@ -46,6 +47,8 @@ ALL = (GLASS, ball("inside", diffuse((0.8, 0.2, 0.2)), 0.3, 0.5, 0.1, 0.1),
        Shape("moving", Sphere(), glass(1.3),
              lambda f: translate((-0.8, 0.4 + 0.2 * f, 0.4)) @ scale(0.3)),
        ball("metal", mirror(), 1.2, 0.4, 0.2, 0.35), ball("tinted", ONE_SIDED, -0.4, 0.2, 1, 0.2))
+MANY = tuple(ball(f"glass{i}", glass(), 0.5 * (i % 6) - 1.2, 0.35, 0.6 * (i // 6) - 0.6, 0.24)
+             for i in range(18))  # two more than count
 
 
 @pytest.mark.parametrize("depth", [3, 4, 7])
@@ -54,11 +57,12 @@ def test_paths_have_the_mean_of_mitsubas_path(depth):
     assert_mean_of_path(renderer, 1)
 
 
-@pytest.mark.parametrize("floor", [diffuse((0.7, 0.5, 0.6)), varnish((0.6, 0.3, 0.1), 0.3)])
-def test_every_channel_has_the_mean_that_it_has_without(floor, monkeypatch):
+@pytest.mark.parametrize(("floor", "some"), [
+    (diffuse((0.7, 0.5, 0.6)), ALL[:4]), (varnish((0.6, 0.3, 0.1), 0.3), ALL[:4]),
+    (diffuse((0.7, 0.5, 0.6)), MANY)])
+def test_every_channel_has_the_mean_that_it_has_without(floor, some, monkeypatch):
     def rendered(seed: int) -> list[Mapping[str, np.ndarray]]:
-        renderer = Renderer(scene(*ALL[:4], floor=floor, size=1.5), HEIGHT, WIDTH,
-                            direct="resampled")
+        renderer = Renderer(scene(*some, floor=floor, size=1.5), HEIGHT, WIDTH, direct="resampled")
         return light_of_frames(renderer, seed, 120)
 
     ours = rendered(0)
@@ -88,11 +92,25 @@ def test_a_small_lamp_makes_no_fireflies(material, depth):
     assert (spread[lit] < 0.6 * mean[lit]).mean() > 0.7
 
 
+@pytest.mark.parametrize(("balls", "size", "most"), [
+    ((ball("ball", glass(), 0.2, 0.46, 0, 0.45),), 0.4, 0.06),       # 0.42 by points alone
+    ((ball("ball", glass(), 0.2, 0.75, 0, 0.45),), 1.0, 0.006),      # 2.4
+    ((ball("ball", mirror(), 0.2, 0.46, 0, 0.45),), 0.4, 0.012),     # 0.05 by directions alone
+    ((ball("a", glass(), -0.35, 0.6, 0, 0.4), ball("b", glass(), 0.75, 0.6, 0, 0.4)), 0.4,
+     0.04)])                                                         # 0.17 if one is left to chance
+def test_what_balls_send_has_little_noise(balls, size, most):
+    """Variance over the squared mean, where light runs together and all around."""
+    renderer = Renderer(scene(*balls, size=size), HEIGHT, WIDTH)
+    mean, variance = mean_and_variance(
+        [renderer.frame(0, k, ("caustic",))["caustic"].mean(-1) for k in range(64)])
+    assert variance.sum() * 64 < most * (mean**2).sum()
+
+
 def test_caustics_are_what_balls_send_to_the_first_hit():
     """With paths of three segments all indirect light of a floor is reflected by what is on it."""
     renderer = Renderer(scene(GLASS, ALL[3], depth=3), HEIGHT, WIDTH)
     assert renderer.balls is not None
-    assert renderer.balls.count == 2
+    assert len(renderer.balls.is_glass) == 2
     frames = [renderer.frame(0, k, ("caustic", "indirect", "id")).images for k in range(20)]
     for f in frames:
         floor = f["id"] == renderer.scene.object_names.index("floor")
@@ -111,9 +129,9 @@ def test_ways_are_all_that_there_are_and_lead_to_the_light():
     n, index, found = 300, 1.5, 0
     d1, d2 = 1.01 + 3 * rng.random(n)**2, 1.2 + 4 * rng.random(n)
     aside = np.pi * rng.random(n)**2
-    ways = _Ways(mi.Float(1 / d1), mi.Float(1 / d2))
-    solved = _solved(ways, mi.Float(aside), mi.Float(index), mi.Bool(True))
-    t, is_way = np.array(solved[0]), np.array(solved[3])
+    ways = Ways(mi.Float(1 / d1), mi.Float(1 / d2))
+    found_ways = solved(ways, mi.Float(aside), mi.Float(index), mi.Bool(True))
+    t, is_way = np.array(found_ways[0]), np.array(found_ways[3])
     grid = np.linspace(0, np.pi / 2, 20001)
     for i in range(n):
         outer = np.arcsin(np.sin(grid) / d1[i]) + np.arcsin(np.sin(grid) / d2[i])
@@ -155,14 +173,10 @@ def _traced(alpha: np.ndarray, d1: float, d2: float, index: float) -> tuple[np.n
         root = np.sqrt(b**2 - (o * o).sum(0) + radius**2)
         return o + d * (-b + (root if far else -root))
 
-    def refracted(d, n, ratio):
-        c = -(d * n).sum(0)
-        return ratio * d + (ratio * c - np.sqrt(1 - ratio**2 * (1 - c**2))) * n
-
     p = met(o, d, 1, far=False)
-    d = refracted(d, p, 1 / index)
+    d = _refracted(d, p, 1 / index)
     p = met(p, d, 1, far=True)
-    d = refracted(d, -p, index)
+    d = _refracted(d, -p, index)
     p = met(p, d, d2, far=True)
     return np.unwrap(np.arctan2(p[1], -p[0])), (p * d).sum(0) / d2
 
@@ -175,9 +189,86 @@ def test_beams_are_spread_as_traced_rays_are(d1, d2):
                                            for e in (0, 1e-6, -1e-6))
     slope = np.abs(more - less) / 2e-6
     expected = np.sin(alpha) / (np.abs(np.sin(phi)) * slope * cosine)
-    ways = _Ways(mi.Float(1 / d1), mi.Float(1 / d2))
+    ways = Ways(mi.Float(1 / d1), mi.Float(1 / d2))
     ours = ways.spread(mi.Float(np.sin(t)), *ways.turned(mi.Float(t), mi.Float(1 / index)))
     np.testing.assert_allclose(np.array(ours), expected, rtol=2e-3)
+
+
+@pytest.mark.parametrize("count", [1, 3, 16])
+def test_balls_are_drawn_as_often_as_they_count(count):
+    """Nearer ones more often; toward glass alone where there is both."""
+    row = tuple(ball(f"ball{i}", mirror() if i == 1 else glass(), 0.7 * i, 0.3, 0, 0.25)
+                for i in range(count))
+    renderer = Renderer(scene(*row), 4, 4)
+    balls, x = renderer.balls, _staged(renderer, (0.1, 1, 0.2))
+    assert balls is not None
+    to_points, to_glass = balls.draws(x, mi.Bool(True))
+    assert to_glass is not None
+    n = 4000
+    for draws in (to_points, to_glass):
+        balls_drawn = np.array(draws.drawn((mi.Float(dr.arange(mi.UInt32, n)) + 0.5) / n))
+        drawn = np.bincount(np.broadcast_to(balls_drawn, n), minlength=count) / n
+        often = [np.array(draws.density(mi.UInt32(i)))[0] for i in range(count)]
+        np.testing.assert_allclose(drawn * np.array(draws.number)[0], often, atol=0.01)
+    if count == 3:
+        np.testing.assert_allclose(drawn[1], 0, atol=0)
+        assert drawn[0] > 2 * drawn[2] > 0
+    assert balls.draws(x, None)[1] is None
+
+
+def test_directions_go_through_balls_as_snell_says():
+    """Of random rays that meet a unit ball at 0, against vectors in float64."""
+    rng = np.random.default_rng(6)
+    n, index = 200, 1.5
+    x = rng.normal(size=(3, n))
+    x *= (1.2 + 3 * rng.random(n)) / np.linalg.norm(x, axis=0)
+    target = rng.normal(size=(3, n))
+    target *= 0.9 * rng.random(n) / np.linalg.norm(target, axis=0)
+    d = (target - x) / np.linalg.norm(target - x, axis=0)
+    b = (x * d).sum(0)
+    p = x + d * (-b - np.sqrt(b**2 - (x * x).sum(0) + 1))
+    within = _refracted(d, p, 1 / index)
+    last = p - 2 * (p * within).sum(0) * within
+    out = _refracted(within, -last, index)
+    sine = np.sqrt(1 - (p * d).sum(0)**2)
+    normal, toward = through(mi.Vector3f(d), mi.Vector3f(-x), mi.Float(sine), mi.Float(index))
+    np.testing.assert_allclose(np.array(normal), last, atol=2e-5)
+    np.testing.assert_allclose(np.array(toward), out, atol=2e-5)
+
+
+def _staged(renderer: Renderer, point: tuple[float, ...]) -> mi.Point3f:
+    """A point of the world where the stage has it."""
+    return mi.Point3f((np.array(point) - renderer.stage.origin) / renderer.stage.unit)
+
+
+def _refracted(d: np.ndarray, n: np.ndarray, ratio: float) -> np.ndarray:
+    """By Snell's law; n: the normal, against d."""
+    c = -(d * n).sum(0)
+    return ratio * d + (ratio * c - np.sqrt(1 - ratio**2 * (1 - c**2))) * n
+
+
+@pytest.mark.parametrize("lamps", [1, 3, 9])
+def test_what_may_shine_is_what_does(lamps):
+    """Spheres around lights miss none that a ray meets, but many rays that meet none."""
+    lights = tuple(Shape(f"lamp{i}", Rectangle() if i % 2 else Sphere(), diffuse((0.0, 0.0, 0.0)),
+                         translate((0.8 * (i % 3) - 1, 1.5 + 0.5 * (i // 3), 0.3)) @ scale(0.2),
+                         (1.0, 1.0, 1.0)) for i in range(lamps))
+    whole = scene(GLASS)
+    renderer = Renderer(replace(whole, shapes=(whole.shapes[0], GLASS, *lights)), 4, 4)
+    balls, rng = renderer.balls, np.random.default_rng(7)
+    assert balls is not None
+    start = _staged(renderer, (0.1, 0.8, 0.8))
+    d = rng.normal(size=(3, 50000))
+    d = mi.Vector3f(d / np.linalg.norm(d, axis=0))
+    pi = renderer.stage.mi_scene.ray_intersect_preliminary(mi.Ray3f(start, d))
+    shines = np.array(pi.is_valid() & pi.shape.is_emitter())
+    may = np.array(balls.may_shine(start, d))
+    assert shines.sum() > 50
+    assert may[shines].all()
+    assert may.mean() < 0.5
+    sky = Renderer(scene(GLASS, environment=0.2), 4, 4).balls
+    assert sky is not None
+    assert np.array(sky.may_shine(start, d)).all()
 
 
 def _near_lamp() -> Scene:
