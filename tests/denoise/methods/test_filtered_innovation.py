@@ -426,7 +426,8 @@ def test_light_by_balls_is_filtered_as_a_texture():
         light.append(replace(frame, images={"color": sent / albedo[-1],
                                             **{name: frame[name] for name in plain}}))
     image, _ = run(FilteredInnovation(), frames)
-    of_pattern = FilteredInnovation(innovation_levels=2, output_levels=2, sharp_output_levels=2)
+    of_pattern = FilteredInnovation(innovation_levels=2, sharp_innovation_levels=2, output_levels=2,
+                                    sharp_output_levels=2)
     expected = run(FilteredInnovation(), rest)[0] + albedo[-1] * run(of_pattern, light)[0]
     np.testing.assert_allclose(image, expected, rtol=2e-4, atol=2e-5)
     assert np.abs(image - run(FilteredInnovation(), [
