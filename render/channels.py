@@ -89,7 +89,7 @@ def _rgb(layer: str) -> tuple[str, ...]:
 
 MOST_GROUPS = 4  # of lights, each with a visibility of its own
 SUN = -2  # `light_id` of the environment's brightest spot, where it is a light of its own
-TRACING = 11
+TRACING = 12
 """Counts the changes of what frames hold. Raise it whenever the same scene, frame and seed give
 other values than rounding explains in any channel, of frames or references: sequences and data sets
 begun before are then not continued. One number serves both, since what changes the mean of light
@@ -106,6 +106,7 @@ under half-open masks mirrors and glass show lamps; the sun of a sky is a light 
 9: lamps have no noise after two turns inside of bent glass (`layers.py`).
 10: later vertices of a frame's path leave light by way of balls to chance (`path.py`).
 11: frames' first vertices look for lights in directions toward balls, too (`lights/balls/`).
+12: shadow rays go through slabs of glass (`lights/slabs.py`).
 """
 
 _ROWS = (

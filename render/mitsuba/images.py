@@ -27,6 +27,7 @@ from onespp.render.host.aligned import owned
 from onespp.scenes.description import Disk, Mesh, Rectangle, Scene, Shape, Sphere
 
 from .appearance import nested
+from .boxes import half_edges
 from .variant import mi
 
 _CLEAR = ("SmoothConductor", "SmoothDielectric", "ThinDielectric", "Null")
@@ -49,6 +50,7 @@ class Images:
             that let light straight through. bent: the same, for glass that is no pane.
         flat: registry indices of flat mirrors that nothing but their shape bends. round: of smooth
             spheres, of metal or denser than what is around. index: (round,) of refraction, 0: none.
+        slabs: of boxes of smooth glass without maps. slab_index: (slabs,) of refraction.
         in_several: the row of what is seen in one after another. layered: whether anything lets
             light through.
 
@@ -78,6 +80,13 @@ class Images:
         round_ = [(index, ball, eta) for index, ball, eta in round_ if eta is not None]
         self.round, self._round = [i for i, *_ in round_], [ball for _, ball, _ in round_]
         self.index = np.array([eta for *_, eta in round_], np.float32)
+        slabs = [(index, mirror, edges, _of_refraction(shapes[index].bsdf()))
+                 for index, mirror in zip(listed, self._mirrors)
+                 if (edges := half_edges(mirror.geometry)) is not None]
+        slabs = [slab for slab in slabs if slab[3]]
+        self.slabs = [index for index, *_ in slabs]
+        self._slabs = [(slab, edges) for _, slab, edges, _ in slabs]
+        self.slab_index = np.array([eta for *_, eta in slabs], np.float32)
         indices = np.arange(max(shapes) + 1)
         self.masks, self.clear, self.bent = (
             np.isin(indices, those).astype(np.uint32) for those in (
@@ -141,6 +150,15 @@ class Images:
         places = [ball.world_from_object_at(frame) for ball in self._round]
         return np.array([[*place[:3, 3], np.linalg.norm(place[:3, 0])]
                          for place in places]).reshape(-1, 4)
+
+    def boxes(self, frame: float) -> np.ndarray:
+        """(n, 4, 3) centre and half edges of each of `slabs`, world space."""
+        boxes = []
+        for slab, edges in self._slabs:
+            place = slab.world_from_object_at(frame)
+            boxes.append(np.vstack([edges[0] @ place[:3, :3].T + place[:3, 3],
+                                    edges[1:] @ place[:3, :3].T]))
+        return np.array(boxes).reshape(-1, 4, 3)
 
     def places(self, frame: float, world_from_object: np.ndarray) -> np.ndarray:
         """(n, 4, 4) of the objects -> those of objects and images, by ID, float64."""

@@ -37,6 +37,7 @@ from onespp.scenes.validity import BUFFERS
 
 from . import merged, pictured_lamps, plugins
 from .appearance import Appearance
+from .boxes import slab_words
 from .images import Images, only_mirrors
 from .textures import Meshes
 from .variant import check_variant, mi
@@ -265,6 +266,14 @@ class MitsubaScene:
         places[:, :3] -= self.origin
         return (np.array(self.images.round, np.uint32), (places / self.unit).astype(np.float32),
                 self.images.index)
+
+    def slabs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Registry indices (m,) uint32 of boxes of glass, and (m, 17) their words in the stage, at
+        the current frame, of `tracer/lights/slabs.py`."""
+        boxes = self.images.boxes(self.frame)
+        boxes[:, 0] -= self.origin
+        words = slab_words(boxes / self.unit, self.images.slab_index)
+        return np.array(self.images.slabs, np.uint32), words
 
     @cached_property
     def appearance(self) -> Appearance:

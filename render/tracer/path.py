@@ -31,6 +31,7 @@ from .lights.balls.light import light_by_balls
 from .lights.candidates import sought_light
 from .lights.mirrors import Mirrors, light_in_mirrors
 from .lights.origin import Origin, found_light
+from .lights.panes import Panes
 from .lights.resampling import DirectLight, Lights, resample_lights
 from .replacement import Layer, Replaced
 from .sampler import Sampler, Sobol
@@ -76,7 +77,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
           max_depth: int, candidates: int = 1, lights: Lights | None = None,
           behind: Replaced | Layer | None = None, tell_straight: bool = False,
           narrow: Callable[[mi.SurfaceInteraction3f], mi.Bool] | None = None,
-          clear: mi.UInt32 | None = None, mirrors: Mirrors | None = None,
+          panes: Panes | None = None, mirrors: Mirrors | None = None,
           balls: Balls | None = None, bent: mi.UInt32 | None = None) -> Radiance:
     """One path a lane.
 
@@ -87,8 +88,8 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         candidates: points of the lights that a vertex compares before it sends its shadow ray.
         lights: those that direct light at the first hit is resampled from; None: it is by MIS too.
         behind: what `ray` and `pi` are behind, if anything. tell_straight: see `Radiance.straight`.
-        narrow: whether a surface is so, as of `resample_lights`. clear: of `MitsubaScene`.
-        mirrors, balls: of the scene as it stands, None where no light is looked for in any.
+        narrow: whether a surface is so, as of `resample_lights`. panes, mirrors, balls: of the
+            scene as it stands, None where light goes through none, or is looked for in none.
         bent: glass of `MitsubaScene`, in which straight paths may turn; None where there is none.
     """
     context = mi.BSDFContext()
@@ -102,8 +103,8 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
     arrived = None  # direct light, but for what purely specular lobes reflect
     beta, eta = mi.Color3f(1), mi.Float(1) if max_depth > SHORT else None
     depth, longest, opacity = mi.UInt32(0), max_depth, None
-    events = None if clear is None else mi.UInt32(0)  # of scattering, where they are not as many
-    origin = Origin.camera(mirrors, balls, compares=True)
+    events = None if panes is None else mi.UInt32(0)  # of scattering, where they are not as many
+    origin = Origin.camera(mirrors, balls, panes, compares=True)
     active = mi.Bool(True)
     if dr.hint(behind is not None, mode="scalar"):
         assert behind is not None
@@ -118,7 +119,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         if dr.hint(behind is not None, mode="scalar"):
             smooth &= longest > 1
         split = resample_lights(scene, first, sampler, smooth, lights,
-                                None if narrow is None else narrow(first), clear,
+                                None if narrow is None else narrow(first), panes,
                                 mi.UInt32(longest) - 2)
         if dr.hint(behind is not None, mode="scalar"):
             assert behind is not None
@@ -127,7 +128,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         arrived = mi.Color3f(split.direct)
 
     while dr.hint(active, exclude=[scene, context, lights, longest, opacity, split, behind, narrow,
-                                   clear, mirrors, balls, bent], max_iterations=max_depth,
+                                   panes, mirrors, balls, bent], max_iterations=max_depth,
                   label="path"):
         si = pi.compute_surface_interaction(mi.Ray3f(o, d))
         bsdf = si.bsdf()
@@ -138,7 +139,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         if dr.hint(lights is not None, mode="scalar"):
             assert lights is not None
             surer = dr.select((order == 1) & si.is_valid(), lights.emitters, 1)
-        found = beta * found_light(scene, si, origin, surer, balls)
+        found = beta * found_light(scene, si, origin, surer, balls, panes)
 
         # Light that this vertex looks for: one shadow ray.
         inner = si.is_valid() & (depth + 1 < longest)
@@ -146,7 +147,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         if dr.hint(lights is not None, mode="scalar"):
             smooth &= depth > 0
             arrived += dr.select((order == 1) & ~origin.from_delta, found, 0)
-        sought = beta * sought_light(scene, si, sampler, candidates, smooth, clear,
+        sought = beta * sought_light(scene, si, sampler, candidates, smooth, panes,
                                      longest - depth - 2)
         sent, seeks = mi.Color3f(0), mi.Bool(False)
         if dr.hint(mirrors is not None or balls is not None, mode="scalar"):
@@ -191,7 +192,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
             straight += dr.select(course.is_straight, found, 0)
             course = course.after(si, bsdf_sample, 1.0 if opacity is None else
                                   dr.select(depth == 0, opacity, 1), bent)
-        origin, is_same = origin.after(si, bsdf_sample, clear, mirrors, balls, seeks, inner,
+        origin, is_same = origin.after(si, bsdf_sample, panes, mirrors, balls, seeks, inner,
                                        depth == 0)
         if dr.hint(events is not None, mode="scalar"):
             assert events is not None
@@ -217,7 +218,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
 @dr.syntax
 def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, sampler: Sobol,
                    start: mi.UInt32, end: mi.UInt32, max_depth: int,
-                   candidates: int, clear: mi.UInt32 | None = None,
+                   candidates: int, panes: Panes | None = None,
                    mirrors: Mirrors | None = None, balls: Balls | None = None) -> mi.Color3f:
     """Sum of samples `start` to `end` - 1 of all lanes: the paths of `trace`, radiance alone.
 
@@ -225,21 +226,22 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
     first hit, which is the same for all of them, and waits for no other lane's.
 
     Args:
-        scene, ray, pi, max_depth, candidates, clear, mirrors, balls: as for `trace`.
+        scene, ray, pi, max_depth, candidates, panes, mirrors, balls: as for `trace`.
         sampler: with the lanes' scrambling, at any sample.
     """
     first = pi.compute_surface_interaction(ray)
     total = mi.Float(end - start) * first.emitter(scene).eval(first)
     o, d, pi = mi.Point3f(ray.o), mi.Vector3f(ray.d), _as_state(pi)
     beta, eta, depth = mi.Color3f(0), mi.Float(1), mi.UInt32(0)
-    origin = Origin.camera(mirrors, balls)
+    origin = Origin.camera(mirrors, balls, panes)
     sample, dimension = mi.UInt32(start) - 1, mi.UInt32(0)
     alive = mi.Bool(False)  # on the way to a hit; at the beginning, all have to start
     running = first.is_valid() & (start < end) & (max_depth > 1)
 
-    while dr.hint(running, exclude=[first, end, sampler, clear, mirrors, balls], label="samples"):
+    while dr.hint(running, exclude=[first, end, sampler, panes, mirrors, balls], label="samples"):
         met = pi.compute_surface_interaction(mi.Ray3f(o, d), active=alive)
-        total += dr.select(alive, beta * found_light(scene, met, origin, balls=balls), 0)
+        total += dr.select(alive, beta * found_light(scene, met, origin, balls=balls,
+                                                      panes=panes), 0)
 
         alive &= met.is_valid() & (depth + 1 < max_depth)
         sample += dr.select(alive, mi.UInt32(0), 1)
@@ -251,7 +253,7 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
 
         bsdf = si.bsdf()
         smooth = running & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        total += beta * sought_light(scene, si, numbers, candidates, smooth, clear,
+        total += beta * sought_light(scene, si, numbers, candidates, smooth, panes,
                                      max_depth - depth - 2)
         seeks = mi.Bool(False)
         if dr.hint(mirrors is not None or balls is not None, mode="scalar"):
@@ -266,7 +268,7 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
         onward = si.spawn_ray(si.to_world(bsdf_sample.wo))
         o, d = onward.o, onward.d
         beta *= bsdf_weight
-        origin, _ = origin.begun(~alive).after(si, bsdf_sample, clear, mirrors, balls, seeks,
+        origin, _ = origin.begun(~alive).after(si, bsdf_sample, panes, mirrors, balls, seeks,
                                                running)
         alive = running & (dr.max(beta) > 0)
         depth += 1

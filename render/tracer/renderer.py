@@ -140,7 +140,7 @@ class Renderer(View):
             if set(channels) & _TRACED:
                 radiance = trace(scene, seen, pi, sampler, self.scene.max_depth,
                                  self.candidates, now.lights, behind, narrow=self._narrow,
-                                 clear=self.stage.clear, mirrors=now.mirrors, balls=now.balls)
+                                 panes=now.panes, mirrors=now.mirrors, balls=now.balls)
                 if behind and behind.other:
                     radiance = self._with_layers(radiance, behind, sampler, now)
                 unit = dr.opaque(mi.Float, self.stage.unit)
@@ -197,7 +197,7 @@ class Renderer(View):
         pi = scene.ray_intersect_preliminary(layer.ray, coherent=False,
                                              active=dr.max(layer.throughput) > 0)
         other = trace(scene, layer.ray, pi, sampler, self.scene.max_depth, self.candidates,
-                      behind=layer, tell_straight=True, clear=self.stage.clear,
+                      behind=layer, tell_straight=True, panes=now.panes,
                       mirrors=now.mirrors, balls=now.balls, bent=self.stage.bent_glass)
         assert other.straight is not None
         light = other.emission + other.direct + other.indirect - other.straight
@@ -216,19 +216,19 @@ class Renderer(View):
         centre_ray, _ = rays.at(x, y)
         centre_pi = scene.ray_intersect_preliminary(centre_ray, coherent=True)
         sample, end = dr.opaque(mi.UInt32, start), dr.opaque(mi.UInt32, start + count)
-        candidates, clear = candidates_for(scene), self.stage.clear
+        candidates, panes = candidates_for(scene), self.panes
         mirrors, balls = self.mirrors, self.balls
         if dr.hint(not antialias, mode="scalar"):
             return sum_of_samples(scene, centre_ray, centre_pi, Sobol(keys, pixel, sample), sample,
-                                  end, self.scene.max_depth, candidates, clear, mirrors, balls)
+                                  end, self.scene.max_depth, candidates, panes, mirrors, balls)
         color = mi.Color3f(0)
-        while dr.hint(sample < end, exclude=[scene, rays, clear, mirrors, balls]):
+        while dr.hint(sample < end, exclude=[scene, rays, panes, mirrors, balls]):
             sampler = Sobol(keys, pixel, sample)
             jitter = sampler.next_2d()
             ray, _ = rays.at(x + jitter.x - 0.5, y + jitter.y - 0.5)
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
             radiance = trace(scene, ray, pi, sampler, self.scene.max_depth, candidates=candidates,
-                             clear=clear, mirrors=mirrors, balls=balls)
+                             panes=panes, mirrors=mirrors, balls=balls)
             color += radiance.emission + radiance.direct + radiance.indirect
             sample += 1
         return color

@@ -125,7 +125,7 @@ def _shade(view: View, now: Now, pixel: mi.UInt32, point: mi.Point3f,
         seen = (id_ >= 0) & (met == id_) & (dr.abs(pi.t - distance) < TOLERANCE * distance)
         sampler = view.new_sampler(now.keys, pixel)
         radiance = trace(scene, ray, pi, sampler, view.scene.max_depth,
-                         view.candidates, now.lights, clear=stage.clear, mirrors=now.mirrors,
+                         view.candidates, now.lights, panes=now.panes, mirrors=now.mirrors,
                          balls=now.balls)
         shaded = mi.luminance(radiance.direct), mi.luminance(radiance.indirect), seen
     dr.eval(shaded)

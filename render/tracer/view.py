@@ -21,6 +21,7 @@ from .camera_rays import NO_JITTER, Offset, PixelRays, halton, pixel_rays
 from .lights.balls.balls import Balls, find_balls
 from .lights.candidates import candidates_for
 from .lights.mirrors import Mirrors, find_mirrors
+from .lights.panes import Panes, find_panes
 from .lights.resampling import Lights
 from .lights.scene_lights import find_lights
 from .sampler import BlueNoise, Keys, Pcg, Sampler, Sobol, mask_table, z_order
@@ -37,8 +38,8 @@ _SAMPLERS: dict[str, Callable[[Keys, Any, int, Any], Sampler]] = {
 @dataclass
 class Now:
     """What the kernel of a frame reads beside the Mitsuba scene: `tables` of the view, and `turned`
-    of the stage; keys of the random numbers; the camera's rays; and `lights_now`, `mirrors` and
-    `balls` of the view, None where nothing is traced."""
+    of the stage; keys of the random numbers; the camera's rays; and `lights_now`, `mirrors`,
+    `balls` and `panes` of the view, None where nothing is traced."""
 
     tables: list[Any]
     turned: tuple[bool, ...]
@@ -47,6 +48,7 @@ class Now:
     lights: Lights | None
     mirrors: Mirrors | None
     balls: Balls | None
+    panes: Panes | None
 
 
 class View:
@@ -115,7 +117,8 @@ class View:
             traced: whether paths are; then `lights` are to be known, as to find them moves the
                 stage.
         """
-        found = (self.lights_now, self.mirrors, self.balls) if traced else (None, None, None)
+        found = ((self.lights_now, self.mirrors, self.balls, self.panes) if traced
+                 else (None, None, None, None))
         return Now(self.tables, self.stage.turned, keys, self.rays(), *found)
 
     @property
@@ -127,6 +130,11 @@ class View:
     def balls(self) -> Balls | None:
         """The same, of balls."""
         return find_balls(self.stage)
+
+    @property
+    def panes(self) -> Panes | None:
+        """What light goes through, at the frame that the stage is set to."""
+        return find_panes(self.stage)
 
     @property
     def tables(self) -> list[Any]:

@@ -27,7 +27,7 @@ import drjit as dr
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.sampler import Sampler
 
-from .panes import passage
+from .panes import is_far, passage
 from .reservoir import offered
 from .strata import power_heuristic
 
@@ -43,13 +43,13 @@ def candidates_for(scene: mi.Scene) -> int:
 
 @dr.syntax
 def sought_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler, candidates: int,
-                 active: mi.Bool, clear: Any = None, most: Any = None) -> mi.Color3f:
+                 active: mi.Bool, panes: Any = None, most: Any = None) -> mi.Color3f:
     """Radiance toward `si.wi` from light sampling, weighed against BSDF sampling; one shadow ray.
 
     Args:
         candidates: M, 1 or more (1: as Mitsuba's `path`, with the same random numbers).
         active: where there is a lobe that is not purely specular.
-        clear, most: as of `panes.passage`; clear is None where rays go through nothing.
+        panes, most: as of `panes.passage`; panes is None where rays go through nothing.
     """
     context = mi.BSDFContext()
     bsdf = si.bsdf()
@@ -59,12 +59,16 @@ def sought_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
         choice = sampler.next_1d()
     total = mi.Float(0)
     kept, kept_luminance, place = mi.Color3f(0), mi.Float(0), mi.Point3f(0)
+    far, toward = (None, None) if panes is None else (mi.Bool(False), mi.Vector3f(0, 0, 1))
     i = mi.UInt32(0)
-    while dr.hint(i < candidates, exclude=[scene, sampler, context, bsdf, si, start, active],
+    while dr.hint(i < candidates, exclude=[scene, sampler, context, bsdf, si, start, active, panes],
                   max_iterations=candidates, label="candidates"):
         y = start.y + GOLDEN * i  # each candidate is uniform for itself; together they spread
         point = mi.Point2f((start.x + i) / candidates, y - dr.floor(y))
         light, weight = scene.sample_emitter_direction(si, point, False, active)
+        if dr.hint(panes is not None, mode="scalar"):
+            assert panes is not None
+            light, weight = panes.bent(si.p, light, weight, active)
         value, p = bsdf.eval_pdf(context, si, si.to_local(light.d), active)
         w = dr.select(light.delta, 1, power_heuristic(light.pdf, p))
         c = dr.select(active & (light.pdf != 0), w * value * weight, 0)
@@ -74,11 +78,14 @@ def sought_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
         kept = dr.select(taken, c, kept)
         kept_luminance = dr.select(taken, luminance, kept_luminance)
         place = dr.select(taken, light.p, place)
+        if dr.hint(panes is not None, mode="scalar"):
+            far = dr.select(taken, is_far(light), far)
+            toward = dr.select(taken, light.d, toward)
         i += 1
     lit = active & (total > 0)
     scale = total / (kept_luminance * candidates)
-    if dr.hint(clear is not None, mode="scalar"):
-        through = passage(scene, si, place, clear, most, lit).through
+    if dr.hint(panes is not None, mode="scalar"):
+        through = passage(scene, si, place, far, toward, panes, most, lit).through
         return dr.select(lit, through * kept * scale, 0)
     shadowed = scene.ray_test(si.spawn_ray_to(place), lit)
     return dr.select(lit & ~shadowed, kept * scale, 0)

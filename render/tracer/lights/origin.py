@@ -16,7 +16,7 @@ from onespp.render.mitsuba.variant import mi
 
 from .balls.balls import Balls
 from .mirrors import Mirrors
-from .panes import goes_through
+from .panes import Gone, Panes, density_through, goes_through
 from .strata import power_heuristic
 
 
@@ -29,6 +29,7 @@ class Origin:
     whether light was looked for in mirrors and balls from there, and the path has met nothing
     since; None where there are none. share: by how much densities of light sampling count; None
     where they always do in full. by: a ball that the path has met since; None where there are none.
+    gone: through which slabs it has; None where there are none.
     """
 
     p: mi.Point3f
@@ -37,42 +38,46 @@ class Origin:
     sought: mi.Bool | None
     share: mi.Float | None
     by: Met | None
+    gone: Gone | None
 
     @staticmethod
-    def camera(mirrors: Mirrors | None, balls: Balls | None, compares: bool = False) -> Origin:
+    def camera(mirrors: Mirrors | None, balls: Balls | None, panes: Panes | None,
+               compares: bool = False) -> Origin:
         """Of a camera's ray; compares: whether vertices compare points of lights by balls."""
         several = mirrors is not None and mirrors.count > 1
         none = mirrors is None and balls is None
         return Origin(mi.Point3f(0), mi.Float(1), mi.Bool(True),
                       None if none else mi.Bool(False), mi.Float(1) if several else None,
-                      None if balls is None else Met.none(compares))
+                      None if balls is None else Met.none(compares),
+                      None if panes is None or panes.slabs is None else Gone.none())
 
     def begun(self, begins: mi.Bool) -> Origin:
         """That of the camera where a path begins."""
         return Origin(self.p, dr.select(begins, 1, self.pdf), self.from_delta | begins,
                       None if self.sought is None else self.sought & ~begins, self.share,
                       None if self.by is None else dr.select(
-                          begins, Met.none(self.by.is_first is not None), self.by))
+                          begins, Met.none(self.by.is_first is not None), self.by),
+                      None if self.gone is None else dr.select(begins, Gone.none(), self.gone))
 
     def came_by_ball(self, depth: mi.UInt32) -> mi.Bool:
         """Whether a path has come from its first vertex by a ball to the one of this depth."""
         assert self.by is not None
         return (self.by.ball != 0) & (depth == dr.select(self.by.refracted, mi.UInt32(3), 2))
 
-    def after(self, si: mi.SurfaceInteraction3f, sample: mi.BSDFSample3f, clear: mi.UInt32 | None,
+    def after(self, si: mi.SurfaceInteraction3f, sample: mi.BSDFSample3f, panes: Panes | None,
               mirrors: Mirrors | None, balls: Balls | None, seeks: mi.Bool, active: mi.Bool,
               is_first: mi.Bool | None = None) -> tuple[Origin, mi.Bool]:
         """Behind a surface, and whether it is the one before it still.
 
         Args:
-            clear: of `MitsubaScene`; mirrors, balls: None where that is not.
+            panes: what light goes through; mirrors, balls: None where that is not.
             seeks: whether light was looked for in mirrors and balls from here. is_first: of
                 `Met`, here.
         """
         is_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
-        p, is_same, sought, share, by = self.p, mi.Bool(False), None, None, None
-        if clear is not None:
-            is_same = goes_through(sample, si.shape, clear, active)
+        p, is_same, sought, share, by, gone = self.p, mi.Bool(False), None, None, None, None
+        if panes is not None:
+            is_same, gone = goes_through(si, sample, panes, self.gone, active)
         elif self.sought is not None:
             sought = seeks & ~is_delta
             if mirrors is not None:
@@ -90,7 +95,8 @@ class Origin:
                     assert is_first is not None
                     by.is_first = dr.select(is_same, by.is_first, is_first)
         return Origin(dr.select(is_same, p, si.p), dr.select(is_same, self.pdf, sample.pdf),
-                      dr.select(is_same, self.from_delta, is_delta), sought, share, by), is_same
+                      dr.select(is_same, self.from_delta, is_delta), sought, share, by,
+                      gone), is_same
 
 
 @dataclass
@@ -131,7 +137,8 @@ class Met:
 
 
 def found_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, origin: Origin,
-                surer: mi.Float | float = 1.0, balls: Balls | None = None) -> mi.Color3f:
+                surer: mi.Float | float = 1.0, balls: Balls | None = None,
+                panes: Panes | None = None) -> mi.Color3f:
     """Radiance of what a direction met, weighed against light sampling.
 
     Args:
@@ -148,6 +155,11 @@ def found_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, origin: Origin,
     if origin.share is not None:
         surer = surer * origin.share
     density = surer * emitter_pdf
+    if origin.gone is not None:
+        assert panes is not None
+        assert panes.slabs is not None
+        density *= density_through(origin.gone, origin.p, hit, ~si.is_valid(), panes.slabs,
+                                   emitter_pdf > 0)
     if balls is not None:
         assert by is not None
         density = dr.select(bent, balls.density(origin.p, hit, si, emitter_pdf, by.ball - 1,

@@ -1,4 +1,4 @@
-"""Light that goes straight on through masks and panes: what a shadow ray sees through them.
+"""Light that goes on through masks and panes: what a shadow ray sees through them.
 
 The hole of a mask and a thin pane let light through without turning it (Mitsuba's `Null` lobes).
 A shadow ray that took them for walls would leave such light to the direction that the BSDF's sample
@@ -9,7 +9,7 @@ takes, which meets a small lamp by rare chance. So a shadow ray goes on through 
 and a direction that was sampled is weighed against light sampling from the last vertex that turned
 it: weights of multiple importance sampling are of a vertex and a direction alone, and add up to 1
 whatever the ray goes through. A passage is a segment of the path all the same, as in Mitsuba, and
-no scattering event.
+no scattering event. So it is through slabs of glass, which shift a ray (`slabs.py`).
 
 Source: the index-matched media boundaries of Mitsuba's `volpath`, for surfaces alone.
 """
@@ -17,11 +17,54 @@ Source: the index-matched media boundaries of Mitsuba's `volpath`, for surfaces 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 
+from onespp.render.host.aligned import owned
 from onespp.render.mitsuba.images import shape_index
+from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
+
+from .slabs import Slabs, find_slabs
+
+
+@dataclass
+class Panes:
+    """What light goes through, of a scene as it stands. clear: by registry index, 1 for shapes that
+    let it straight through. slabs: None where there are none."""
+
+    clear: mi.UInt32
+    slabs: Slabs | None
+
+    def bent(self, x: mi.Point3f, light: mi.DirectionSample3f, weight: mi.Color3f,
+             active: mi.Bool) -> tuple[mi.DirectionSample3f, mi.Color3f]:
+        """A point of a light and its radiance over density, by the way through slabs: its direction
+        and its density are of that. Points that shine are not seen through any, as by Mitsuba's
+        `path`."""
+        if self.slabs is None:
+            return light, weight
+        far = is_far(light)
+        between = self.slabs.between(x, light.d, light.dist, far, active)
+        toward, ratio = between.bent(light.d, light.dist, far, light.n)
+        seen = (ratio > 0) & (~light.delta | (between.which == 0))
+        light = mi.DirectionSample3f(light)
+        light.d, light.pdf = toward, dr.select(seen, light.pdf * ratio, 0)
+        return light, dr.select(seen, weight / ratio, 0)
+
+
+def find_panes(stage: MitsubaScene) -> Panes | None:
+    """Of a scene, at its frame; None where light goes through nothing."""
+    slabs = find_slabs(stage)
+    if stage.clear is None and slabs is None:
+        return None
+    clear = owned(mi.UInt32, stage.images.clear) if stage.clear is None else stage.clear
+    return Panes(clear, slabs)
+
+
+def is_far(light: mi.DirectionSample3f) -> mi.Bool:
+    """Whether a light's point is in the sky."""
+    return mi.has_flag(light.emitter.flags(), mi.EmitterFlags.Infinite)
 
 
 @dataclass
@@ -39,37 +82,92 @@ class Passage:
 
 
 @dr.syntax
-def passage(scene: mi.Scene, si: mi.SurfaceInteraction3f, point: mi.Point3f, clear: mi.UInt32,
-            most: mi.UInt32, active: mi.Bool) -> Passage:
+def passage(scene: mi.Scene, si: mi.SurfaceInteraction3f, point: mi.Point3f, far: mi.Bool,
+            toward: mi.Vector3f, panes: Any, most: mi.UInt32, active: mi.Bool) -> Passage:
     """From a surface to a light's point.
 
     Args:
-        clear: of `MitsubaScene.clear`. most: surfaces that the ray may go through.
+        far: whether the point is in the sky. toward: in what direction, of `Panes.bent`. panes:
+            `Panes`. most: faces that the ray may go through.
     """
+    which = mi.UInt32(0)
     through, distance = mi.Color3f(dr.select(active, 1, 0)), mi.Float(0)
     shape, face = mi.UInt32(0), mi.UInt32(0)
+    crossed, inside = mi.UInt32(0), mi.UInt32(0)
     ray, left, going = si.spawn_ray_to(point), mi.UInt32(most), mi.Bool(active)
-    while dr.hint(going, exclude=[scene, si, point, clear, active], label="panes"):
+    if dr.hint(panes.slabs is not None, mode="scalar"):
+        straight = point - si.p
+        length = dr.norm(straight)
+        which = panes.slabs.between(si.p, straight / length, length, far, active).which
+        ray = dr.select(which != 0, si.spawn_ray(toward), ray)
+    while dr.hint(going, exclude=[scene, si, point, far, which, panes, active], label="panes"):
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=going)
         met = going & pi.is_valid()
         here = pi.compute_surface_interaction(ray, mi.RayFlags.All, met)
         index = shape_index(pi.shape, met)
-        asked = met & (left > 0) & (dr.gather(mi.UInt32, clear, index, met) != 0)
+        asked = met & (left > 0) & (dr.gather(mi.UInt32, panes.clear, index, met) != 0)
         share = here.bsdf().eval_null_transmission(here, asked)
         passes = asked & (dr.max(share) > 0)
+        onward = here.spawn_ray_to(point)
+        if dr.hint(panes.slabs is not None, mode="scalar"):
+            at = panes.slabs.crossing(here, inside, met & (left > 0))
+            crosses = (at.bit & which) != 0
+            sample, weight = here.bsdf().sample(mi.BSDFContext(), here, 1, mi.Point2f(0.5), crosses)
+            refracts = crosses & mi.has_flag(sample.sampled_type, mi.BSDFFlags.DeltaTransmission)
+            share = dr.select(refracts, weight * sample.pdf, share)
+            passes |= refracts & (dr.max(share) > 0)
+            crossed |= dr.select(refracts, at.left, 0)
+            inside = dr.select(refracts, dr.select(at.enters, at.slab, 0), inside)
+            is_bent = (which != 0) & (far | (crossed != which))
+            d = dr.select(refracts, here.to_world(sample.wo), ray.d)
+            onward = dr.select(is_bent, here.spawn_ray(d), onward)
         through *= dr.select(passes, share, dr.select(met, 0, 1))
         stopped = met & ~passes
         distance = dr.select(stopped, dr.norm(here.p - si.p), distance)
         shape = dr.select(stopped, index, shape)
         face = dr.select(stopped, pi.prim_index, face)
-        ray = here.spawn_ray_to(point)
+        ray = onward
         left -= dr.select(passes, mi.UInt32(1), 0)
         going = passes
+    if dr.hint(panes.slabs is not None, mode="scalar"):
+        through = dr.select(crossed == which, through, 0)
     return Passage(through, distance, shape, face)
 
 
-def goes_through(sample: mi.BSDFSample3f, shape: mi.ShapePtr, clear: mi.UInt32,
-                 active: mi.Bool) -> mi.Bool:
-    """Whether a sampled direction goes straight on through what shadow rays go through, too."""
-    return (active & mi.has_flag(sample.sampled_type, mi.BSDFFlags.Null)
-            & (dr.gather(mi.UInt32, clear, shape_index(shape, active), active) != 0))
+@dataclass
+class Gone:
+    """Slabs that a path has gone through since its origin. which: a bit for each. inside: the one
+    that it is in, from 1; 0: none."""
+
+    which: mi.UInt32
+    inside: mi.UInt32
+
+    @staticmethod
+    def none() -> Gone:
+        return Gone(mi.UInt32(0), mi.UInt32(0))
+
+
+def goes_through(si: mi.SurfaceInteraction3f, sample: mi.BSDFSample3f, panes: Panes,
+                 gone: Gone | None, active: mi.Bool) -> tuple[mi.Bool, Gone | None]:
+    """Whether a sampled direction goes on through what shadow rays go through, too; and through
+    which slabs it has, none where it does not."""
+    is_null, is_refracted = (mi.has_flag(sample.sampled_type, flag) for flag in (
+        mi.BSDFFlags.Null, mi.BSDFFlags.DeltaTransmission))
+    clear = dr.gather(mi.UInt32, panes.clear, shape_index(si.shape, active), active) != 0
+    goes = active & is_null & clear
+    if panes.slabs is None or gone is None:
+        return goes, None
+    at = panes.slabs.crossing(si, gone.inside, active & is_refracted)
+    crosses = at.enters | at.leaves
+    goes |= crosses
+    inside = dr.select(crosses, dr.select(at.enters, at.slab, 0), gone.inside)
+    return goes, Gone(dr.select(goes, gone.which | at.left, 0), dr.select(goes, inside, 0))
+
+
+def density_through(gone: Gone, x: mi.Point3f, hit: mi.DirectionSample3f, is_sky: mi.Bool,
+                    slabs: Slabs, active: mi.Bool) -> mi.Float:
+    """The density of light sampling at x of a direction that has come to a light through slabs,
+    over that by the straight line; 0 where light sampling does not go through these."""
+    between = slabs.between(x, hit.d, hit.dist, is_sky, active)
+    _, ratio = between.bent(hit.d, hit.dist, is_sky, hit.n)
+    return dr.select((between.which == gone.which) & (gone.inside == 0), ratio, 0)

@@ -51,7 +51,7 @@ from onespp.render.tracer.sampler import Sampler
 
 from .clusters import Clusters, light_of_cluster
 from .middles import Middles, middles_of
-from .panes import passage
+from .panes import is_far, passage
 from .reservoir import offered
 from .strata import light_point
 from .sun import SUN_BIT, Sun
@@ -163,14 +163,14 @@ class Pick:
 
 @dr.syntax
 def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
-                    active: mi.Bool, lights: Any, narrow: Any = None, clear: Any = None,
+                    active: mi.Bool, lights: Any, narrow: Any = None, panes: Any = None,
                     most: Any = None) -> DirectLight:
     """Direct light toward `si.wi` from light sampling, one shadow ray a lane.
 
     Args:
         lights: `Lights`, of the scene. narrow: mask of surfaces that have no lobes but such as
             `NARROW` tells, None where there are none or there is no sky.
-        clear, most: as of `panes.passage`; clear is None where rays go through nothing.
+        panes, most: as of `panes.passage`; panes is None where rays go through nothing.
     """
     strata = dr.width(lights.stratum)
     choice, jitter = sampler.next_1d(), sampler.next_2d()
@@ -183,12 +183,12 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     if dr.hint(lights.clusters is not None, mode="scalar"):
         stratum, more = light_of_cluster(lights.clusters, picked, scene, si, jitter,
                                          sampler.next_2d(), active, lights.sun)
-    point = light_point(scene, si, stratum, jitter, active, lights.sun)
+    point = light_point(scene, si, stratum, jitter, active, lights.sun, panes)
     c, light = more * point.c, point.light
     lit = active & (dr.max(c) > 0)
     weight = point.weight(lights.share(stratum))
-    if dr.hint(clear is not None, mode="scalar"):
-        between = passage(scene, si, light.p, clear, most, lit)
+    if dr.hint(panes is not None, mode="scalar"):
+        between = passage(scene, si, light.p, is_far(light), light.d, panes, most, lit)
         shape, face, distance = between.shape, between.face, between.distance
         direct = dr.select(lit, between.through * weight * c / p, 0)
     else:

@@ -17,6 +17,7 @@ import drjit as dr
 
 from onespp.render.mitsuba.variant import mi
 
+from .panes import Panes
 from .sun import Sun
 
 
@@ -50,13 +51,16 @@ def stratum_place(stratum: mi.UInt32, place: mi.Point2f) -> tuple[mi.Point2f, mi
 
 
 def light_point(scene: mi.Scene, si: mi.SurfaceInteraction3f, stratum: mi.UInt32,
-                place: mi.Point2f, active: mi.Bool, sun: Sun | None) -> LightPoint:
-    """At a place in a stratum, toward `si.wi`."""
+                place: mi.Point2f, active: mi.Bool, sun: Sun | None,
+                panes: Panes | None = None) -> LightPoint:
+    """At a place in a stratum, toward `si.wi`; by way of panes, if there are some."""
     emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), stratum >> 8, active)
     sample, side = stratum_place(stratum, place)
     light, weight = emitter.sample_direction(si, sample, active)
     if sun is not None:
         light, weight = sun.told_apart(scene, si, stratum, sample, light, weight, active)
+    if panes is not None:
+        light, weight = panes.bent(si.p, light, weight, active)
     value, pdf = si.bsdf().eval_pdf(mi.BSDFContext(), si, si.to_local(light.d), active)
     c = dr.select(active & (light.pdf > 0), value * weight, 0) / dr.square(side)
     return LightPoint(c, light, pdf)
