@@ -106,7 +106,8 @@ under half-open masks mirrors and glass show lamps; the sun of a sky is a light 
 9: lamps have no noise after two turns inside of bent glass (`layers.py`).
 10: later vertices of a frame's path leave light by way of balls to chance (`path.py`).
 11: frames' first vertices look for lights in directions toward balls, too (`lights/balls/`).
-12: shadow rays go through slabs of glass (`lights/slabs.py`).
+12: shadow rays go through slabs of glass (`lights/slabs.py`), and light is looked for in what they
+and panes mirror (`lights/mirrors.py`), also where masks are.
 """
 
 _ROWS = (

@@ -48,7 +48,8 @@ class Images:
         rows: (registry indices) uint32, which row of images is in a shape, from 1; 0: none.
         masks: (registry indices) uint32, 1 for shapes cut out by a mask. clear: the same, for those
             that let light straight through. bent: the same, for glass that is no pane.
-        flat: registry indices of flat mirrors that nothing but their shape bends. round: of smooth
+        flat: registry indices of flat mirrors that nothing but their shape bends. thin: of flat
+            panes without thickness, which reflect as well. round: of smooth
             spheres, of metal or denser than what is around. index: (round,) of refraction, 0: none.
         slabs: of boxes of smooth glass without maps. slab_index: (slabs,) of refraction.
         in_several: the row of what is seen in one after another. layered: whether anything lets
@@ -74,6 +75,11 @@ class Images:
                 if plane is not None and _is_plain(shapes[index].bsdf())]
         self.flat = [index for index, *_ in flat]
         self._flat = [(mirror, plane) for _, mirror, plane in flat]
+        thin = [(index, mirror, plane) for index, mirror, plane
+                in zip(listed, self._mirrors, self._planes)
+                if plane is not None and shapes[index].bsdf().class_name() == "ThinDielectric"]
+        self.thin = [index for index, *_ in thin]
+        self._thin = [(mirror, plane) for _, mirror, plane in thin]
         round_ = [(index, mirror, _of_refraction(shapes[index].bsdf())) for index, mirror
                   in zip(listed, self._mirrors)
                   if isinstance(mirror.geometry, Sphere) and not mirror.geometry.flipped]
@@ -141,9 +147,9 @@ class Images:
         return owned(mi.UInt32, rows)
 
     def flat_planes(self, frame: float) -> np.ndarray:
-        """(n, 2, 3) a point and the unit normal of each of `flat`, world space."""
+        """(n, 2, 3) a point and the unit normal of each of `flat` and `thin`, world space."""
         return np.array([_plane_at(mirror.world_from_object_at(frame), *plane)
-                         for mirror, plane in self._flat]).reshape(-1, 2, 3)
+                         for mirror, plane in self._flat + self._thin]).reshape(-1, 2, 3)
 
     def balls(self, frame: float) -> np.ndarray:
         """(n, 4) centre and radius of each of `round`, world space."""

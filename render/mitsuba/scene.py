@@ -251,12 +251,12 @@ class MitsubaScene:
         return _where_any(self.images.clear)
 
     def flat_mirrors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Registry indices (m,) uint32 of flat mirrors, and (m, 4) their planes (n, d), n . x = d
-        in the stage, at the current frame."""
+        """Registry indices (m,) uint32 of flat mirrors and panes, and (m, 4) their planes (n, d),
+        n . x = d in the stage, at the current frame."""
         found = self.images.flat_planes(self.frame)
         point, normal = (found[:, 0] - self.origin) / self.unit, found[:, 1]
         distance = (point * normal).sum(-1, keepdims=True)
-        return (np.array(self.images.flat, np.uint32),
+        return (np.array(self.images.flat + self.images.thin, np.uint32),
                 np.concatenate([normal, distance], -1).astype(np.float32))
 
     def balls(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

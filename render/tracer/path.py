@@ -139,7 +139,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
         if dr.hint(lights is not None, mode="scalar"):
             assert lights is not None
             surer = dr.select((order == 1) & si.is_valid(), lights.emitters, 1)
-        found = beta * found_light(scene, si, origin, surer, balls, panes)
+        found = beta * found_light(scene, si, origin, surer, balls, panes, mirrors)
 
         # Light that this vertex looks for: one shadow ray.
         inner = si.is_valid() & (depth + 1 < longest)
@@ -154,10 +154,11 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
             # (Not where some of it would be specular.)
             seeks = inner & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth) & (depth + 2 < longest)
             seeks &= (depth > 0) | ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Glossy)
-            if dr.hint(balls is not None, mode="scalar"):
+            if dr.hint(balls is not None or panes is not None, mode="scalar"):
                 seeks &= depth < _BY_BALLS
             if dr.hint(mirrors is not None, mode="scalar"):
-                sent += beta * light_in_mirrors(scene, si, sampler, mirrors, seeks)
+                sent += beta * light_in_mirrors(scene, si, sampler, mirrors, longest - depth,
+                                                seeks)
             if dr.hint(balls is not None, mode="scalar"):
                 assert caustic is not None
                 by_ball = beta * light_by_balls(scene, si, sampler, balls, depth == 0,
@@ -241,7 +242,7 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
     while dr.hint(running, exclude=[first, end, sampler, panes, mirrors, balls], label="samples"):
         met = pi.compute_surface_interaction(mi.Ray3f(o, d), active=alive)
         total += dr.select(alive, beta * found_light(scene, met, origin, balls=balls,
-                                                      panes=panes), 0)
+                                                      panes=panes, mirrors=mirrors), 0)
 
         alive &= met.is_valid() & (depth + 1 < max_depth)
         sample += dr.select(alive, mi.UInt32(0), 1)
@@ -259,7 +260,8 @@ def sum_of_samples(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersectio
         if dr.hint(mirrors is not None or balls is not None, mode="scalar"):
             seeks = smooth & (depth + 2 < max_depth)
             if dr.hint(mirrors is not None, mode="scalar"):
-                total += beta * light_in_mirrors(scene, si, numbers, mirrors, seeks)
+                total += beta * light_in_mirrors(scene, si, numbers, mirrors, max_depth - depth,
+                                                 seeks)
             if dr.hint(balls is not None, mode="scalar"):
                 total += beta * light_by_balls(scene, si, numbers, balls, None, max_depth - depth,
                                                seeks)

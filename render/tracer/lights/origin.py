@@ -16,7 +16,7 @@ from onespp.render.mitsuba.variant import mi
 
 from .balls.balls import Balls
 from .mirrors import Mirrors
-from .panes import Gone, Panes, density_through, goes_through
+from .panes import Gone, Panes, density_through
 from .strata import power_heuristic
 
 
@@ -29,7 +29,8 @@ class Origin:
     whether light was looked for in mirrors and balls from there, and the path has met nothing
     since; None where there are none. share: by how much densities of light sampling count; None
     where they always do in full. by: a ball that the path has met since; None where there are none.
-    gone: through which slabs it has; None where there are none.
+    gone: what it has gone through since; None where there is nothing that it could. shown: what
+    mirror it was in, if there are any beside that.
     """
 
     p: mi.Point3f
@@ -39,17 +40,19 @@ class Origin:
     share: mi.Float | None
     by: Met | None
     gone: Gone | None
+    shown: Shown | None
 
     @staticmethod
     def camera(mirrors: Mirrors | None, balls: Balls | None, panes: Panes | None,
                compares: bool = False) -> Origin:
         """Of a camera's ray; compares: whether vertices compare points of lights by balls."""
-        several = mirrors is not None and mirrors.count > 1
-        none = mirrors is None and balls is None
+        several = mirrors is not None and panes is None and mirrors.count > 1
+        none = panes is not None or (mirrors is None and balls is None)
         return Origin(mi.Point3f(0), mi.Float(1), mi.Bool(True),
                       None if none else mi.Bool(False), mi.Float(1) if several else None,
                       None if balls is None else Met.none(compares),
-                      None if panes is None or panes.slabs is None else Gone.none())
+                      None if panes is None else Gone.none(),
+                      None if panes is None or mirrors is None else Shown.none())
 
     def begun(self, begins: mi.Bool) -> Origin:
         """That of the camera where a path begins."""
@@ -57,7 +60,8 @@ class Origin:
                       None if self.sought is None else self.sought & ~begins, self.share,
                       None if self.by is None else dr.select(
                           begins, Met.none(self.by.is_first is not None), self.by),
-                      None if self.gone is None else dr.select(begins, Gone.none(), self.gone))
+                      None if self.gone is None else dr.select(begins, Gone.none(), self.gone),
+                      None if self.shown is None else dr.select(begins, Shown.none(), self.shown))
 
     def came_by_ball(self, depth: mi.UInt32) -> mi.Bool:
         """Whether a path has come from its first vertex by a ball to the one of this depth."""
@@ -75,9 +79,20 @@ class Origin:
                 `Met`, here.
         """
         is_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
-        p, is_same, sought, share, by, gone = self.p, mi.Bool(False), None, None, None, None
+        p, is_same, sought, share, by = self.p, mi.Bool(False), None, None, None
+        gone, shown = None, None
         if panes is not None:
-            is_same, gone = goes_through(si, sample, panes, self.gone, active)
+            assert self.gone is not None
+            gone, is_same = self.gone.after(si, sample, panes, active)
+            if self.shown is not None:
+                assert mirrors is not None
+                shown, reflects, is_same = self.shown.after(si, sample, mirrors, self.gone, is_same,
+                                                            active)
+                p = mirrors.image(shown.mirror - 1, self.p, reflects)
+                p = dr.select(reflects, p, self.p)
+                shown = dr.select(is_same, shown, Shown(mi.UInt32(0), mi.Bool(False),
+                                                        seeks & ~is_delta))
+            gone = dr.select(is_same, gone, Gone.none())
         elif self.sought is not None:
             sought = seeks & ~is_delta
             if mirrors is not None:
@@ -96,7 +111,7 @@ class Origin:
                     by.is_first = dr.select(is_same, by.is_first, is_first)
         return Origin(dr.select(is_same, p, si.p), dr.select(is_same, self.pdf, sample.pdf),
                       dr.select(is_same, self.from_delta, is_delta), sought, share, by,
-                      gone), is_same
+                      gone, shown), is_same
 
 
 @dataclass
@@ -136,9 +151,47 @@ class Met:
                    meets & passes | leaves, meets & passes, self.is_first)
 
 
+@dataclass
+class Shown:
+    """A mirror, beside panes, that a path has met since its origin, before all else.
+
+    mirror: which, from 1; 0: none. behind: whether from inside of a slab. sought: whether light was
+    looked for in mirrors from the origin.
+    """
+
+    mirror: mi.UInt32
+    behind: mi.Bool
+    sought: mi.Bool
+
+    @staticmethod
+    def none() -> Shown:
+        return Shown(mi.UInt32(0), mi.Bool(False), mi.Bool(False))
+
+    def after(self, si: mi.SurfaceInteraction3f, sample: mi.BSDFSample3f, mirrors: Mirrors,
+              before: Gone, goes: mi.Bool, active: mi.Bool) -> tuple[Shown, mi.Bool, mi.Bool]:
+        """Behind a surface; whether that is the mirror; and whether light sampling would come by
+        the same way still.
+
+        Args:
+            before: what the path has gone through. goes: whether it goes through this, too.
+        """
+        bounces = active & mi.has_flag(sample.sampled_type, mi.BSDFFlags.DeltaReflection)
+        row, none_yet = mirrors.row_at(si, bounces), self.mirror == 0
+        reflects = bounces & (row != 0) & none_yet & self.sought & ~before.any
+        behind = before.inside != 0
+        thickness, _ = mirrors.slab(row - 1, reflects)
+        reflects &= (thickness == 0) | ((si.wi.z < 0) == behind)
+        reflects &= (thickness > 0) | ~behind
+        leaves = goes & ~none_yet & self.behind & behind
+        same = reflects | leaves | (goes & none_yet)
+        return (Shown(dr.select(reflects, row, self.mirror), dr.select(reflects, behind,
+                                                                       self.behind), self.sought),
+                reflects, same)
+
+
 def found_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, origin: Origin,
                 surer: mi.Float | float = 1.0, balls: Balls | None = None,
-                panes: Panes | None = None) -> mi.Color3f:
+                panes: Panes | None = None, mirrors: Mirrors | None = None) -> mi.Color3f:
     """Radiance of what a direction met, weighed against light sampling.
 
     Args:
@@ -155,11 +208,19 @@ def found_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, origin: Origin,
     if origin.share is not None:
         surer = surer * origin.share
     density = surer * emitter_pdf
-    if origin.gone is not None:
-        assert panes is not None
-        assert panes.slabs is not None
-        density *= density_through(origin.gone, origin.p, hit, ~si.is_valid(), panes.slabs,
-                                   emitter_pdf > 0)
+    if origin.gone is not None and panes is not None:
+        through, is_sky = mi.Float(1), ~si.is_valid()
+        if panes.slabs is not None:
+            through = density_through(origin.gone, origin.p, hit, is_sky, panes.slabs,
+                                      emitter_pdf > 0)
+        if origin.shown is not None:
+            assert mirrors is not None
+            in_mirror = origin.shown.mirror != 0
+            _, shown = mirrors.unfolded(origin.shown.mirror - 1, hit.d, hit.dist, is_sky, hit.n,
+                                        in_mirror & origin.shown.behind)
+            shown = dr.select(origin.gone.inside == 0, shown / mirrors.count, 0)
+            through = dr.select(in_mirror, shown, through)
+        density = density * through
     if balls is not None:
         assert by is not None
         density = dr.select(bent, balls.density(origin.p, hit, si, emitter_pdf, by.ball - 1,

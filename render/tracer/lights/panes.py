@@ -136,32 +136,33 @@ def passage(scene: mi.Scene, si: mi.SurfaceInteraction3f, point: mi.Point3f, far
 
 @dataclass
 class Gone:
-    """Slabs that a path has gone through since its origin. which: a bit for each. inside: the one
-    that it is in, from 1; 0: none."""
+    """What a path has gone through since its origin, all that light sampling goes through, too.
 
-    which: mi.UInt32
+    slabs: a bit for each that it has left. inside: the one that it is in, from 1; 0: none. any:
+    whether it has gone through something.
+    """
+
+    slabs: mi.UInt32
     inside: mi.UInt32
+    any: mi.Bool
 
     @staticmethod
     def none() -> Gone:
-        return Gone(mi.UInt32(0), mi.UInt32(0))
+        return Gone(mi.UInt32(0), mi.UInt32(0), mi.Bool(False))
 
-
-def goes_through(si: mi.SurfaceInteraction3f, sample: mi.BSDFSample3f, panes: Panes,
-                 gone: Gone | None, active: mi.Bool) -> tuple[mi.Bool, Gone | None]:
-    """Whether a sampled direction goes on through what shadow rays go through, too; and through
-    which slabs it has, none where it does not."""
-    is_null, is_refracted = (mi.has_flag(sample.sampled_type, flag) for flag in (
-        mi.BSDFFlags.Null, mi.BSDFFlags.DeltaTransmission))
-    clear = dr.gather(mi.UInt32, panes.clear, shape_index(si.shape, active), active) != 0
-    goes = active & is_null & clear
-    if panes.slabs is None or gone is None:
-        return goes, None
-    at = panes.slabs.crossing(si, gone.inside, active & is_refracted)
-    crosses = at.enters | at.leaves
-    goes |= crosses
-    inside = dr.select(crosses, dr.select(at.enters, at.slab, 0), gone.inside)
-    return goes, Gone(dr.select(goes, gone.which | at.left, 0), dr.select(goes, inside, 0))
+    def after(self, si: mi.SurfaceInteraction3f, sample: mi.BSDFSample3f, panes: Panes,
+              active: mi.Bool) -> tuple[Gone, mi.Bool]:
+        """Behind a surface; and whether a sampled direction goes on through it."""
+        is_null, is_refracted = (mi.has_flag(sample.sampled_type, flag) for flag in (
+            mi.BSDFFlags.Null, mi.BSDFFlags.DeltaTransmission))
+        goes = (active & is_null & (self.inside == 0)
+                & (dr.gather(mi.UInt32, panes.clear, shape_index(si.shape, active), active) != 0))
+        if panes.slabs is None:
+            return Gone(self.slabs, self.inside, self.any | goes), goes
+        at = panes.slabs.crossing(si, self.inside, active & is_refracted)
+        crosses = at.enters | at.leaves
+        inside = dr.select(crosses, dr.select(at.enters, at.slab, 0), self.inside)
+        return Gone(self.slabs | at.left, inside, self.any | goes | at.leaves), goes | crosses
 
 
 def density_through(gone: Gone, x: mi.Point3f, hit: mi.DirectionSample3f, is_sky: mi.Bool,
@@ -170,4 +171,4 @@ def density_through(gone: Gone, x: mi.Point3f, hit: mi.DirectionSample3f, is_sky
     over that by the straight line; 0 where light sampling does not go through these."""
     between = slabs.between(x, hit.d, hit.dist, is_sky, active)
     _, ratio = between.bent(hit.d, hit.dist, is_sky, hit.n)
-    return dr.select((between.which == gone.which) & (gone.inside == 0), ratio, 0)
+    return dr.select((between.which == gone.slabs) & (gone.inside == 0), ratio, 0)

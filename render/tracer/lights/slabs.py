@@ -161,10 +161,10 @@ class Crossing:
 
 
 def find_slabs(stage: MitsubaScene) -> Slabs | None:
-    """Of a scene, at its frame. None where there are none, or light is looked for in mirrors or by
-    way of balls: what comes by both kinds is not known to either."""
+    """Of a scene, at its frame. None where there are none, or light is looked for by way of balls:
+    what comes by both kinds is not known to either."""
     images = stage.images
-    if not images.slabs or images.flat or images.round:
+    if not images.slabs or (images.round and stage.clear is None):
         return None
     shapes, table = stage.slabs()
     return Slabs(owned(mi.Float, table.ravel()), images.numbered(shapes), len(shapes))
