@@ -98,7 +98,7 @@ def test_what_goes_another_way_is_left_to_chance(things, monkeypatch):
 
 
 def test_no_path_is_longer_than_it_may_be(monkeypatch):
-    """By the far side of an upright slab there are four segments from the first hit on: five in all."""
+    """By the far side of an upright slab there are four segments from the first hit on."""
     def rendered(seed: int) -> list[np.ndarray]:
         wall = Shape("wall", box((2, 1.6, 0.2)), glass(2.5), translate((0, 0.8, -0.8)))
         renderer = Renderer(under(wall, LAMP, lamp=0.5, depth=4), HEIGHT, WIDTH)
