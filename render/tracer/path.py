@@ -39,8 +39,8 @@ from .sampler import Sampler, Sobol
 SHORT = 8  # segments, up to which paths end by themselves
 FIRST = 5  # segments after which roulette begins, as in Mitsuba
 _LIKELY = 0.95  # the largest probability to go on
-_BY_BALLS = 2  # where there are balls, vertices that look for light by way of them and of mirrors:
-               # what later ones gain is not worth their time
+_SEEKING = 2  # where there are balls or panes, vertices of a frame's path that look for light by
+              # way of balls and mirrors: what later ones gain is not worth their time
 LARGEST_VISIBILITY = 1e4  # picks of 16 lights give up to 2560, as `resampling.py` weighs them
 
 
@@ -155,7 +155,7 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
             seeks = inner & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth) & (depth + 2 < longest)
             seeks &= (depth > 0) | ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Glossy)
             if dr.hint(balls is not None or panes is not None, mode="scalar"):
-                seeks &= depth < _BY_BALLS
+                seeks &= depth < _SEEKING
             if dr.hint(mirrors is not None, mode="scalar"):
                 sent += beta * light_in_mirrors(scene, si, sampler, mirrors, longest - depth,
                                                 seeks)

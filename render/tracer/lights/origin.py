@@ -1,9 +1,10 @@
 """Light that a drawn direction runs into, weighed against light sampling where it was drawn.
 
 Weights of multiple importance sampling are of a vertex and a direction. What a path does on its way
-without being turned by chance changes neither: straight on through a mask or a pane (`panes.py`) it
-has left the same vertex in the same direction; by a flat mirror (`mirrors.py`) it has left that
-vertex's image; by a ball (`balls/`) light sampling has a density of its own.
+without being turned by chance changes neither: on through a mask, a pane (`panes.py`) or a slab of
+glass (`slabs.py`) it has left the same vertex in the same direction; by a flat mirror
+(`mirrors.py`) it has left that vertex's image; by a ball (`balls/`) and through glass light
+sampling has a density of its own.
 """
 
 from __future__ import annotations
