@@ -9,6 +9,7 @@ import numpy as np
 from onespp.scenes.description import Cylinder, Disk, Mesh, Rectangle, Sphere
 
 _SAME = 1e-5  # distance of places that are one, as a share of a mesh's size
+_NONE = 1e-9  # volume, as a share of that of a box of such edges
 _FLAT = 1e-3  # of a shading normal from that of its face, at most
 
 
@@ -61,9 +62,12 @@ def _is_all_of(mesh: Mesh, box: np.ndarray) -> bool:
 def slab_words(boxes: np.ndarray, indices: np.ndarray) -> np.ndarray:
     """(n, 17) float32: of boxes (n, 4, 3), centre and half edges, the centre; the rows that take an
     offset from there to shares of the half edges, those of the thinnest side first; and its
-    normal, its thickness, and the index of refraction."""
+    normal, its thickness, and the index of refraction. All are 0 of what has no volume."""
     words = np.zeros((len(boxes), 17), np.float32)
     for i, (centre, *edges) in enumerate(boxes):
+        volume = abs(np.linalg.det(edges))
+        if not volume > _NONE * np.prod(np.linalg.norm(edges, axis=1)):
+            continue
         inverse = np.linalg.inv(np.array(edges).T)
         thin = np.argsort(-np.linalg.norm(inverse, axis=1), kind="stable")
         rows = inverse[thin]

@@ -140,10 +140,10 @@ class Images:
             moves += [False] * len(shapes)
         return tuple(name for name, is_so in zip(self.names(), moves, strict=True) if is_so)
 
-    def numbered(self, shapes: np.ndarray) -> mi.UInt32:
-        """By registry index, which of some shapes it is, from 1; 0: none."""
+    def numbered(self, shapes: np.ndarray, count: np.ndarray | bool = True) -> mi.UInt32:
+        """By registry index, which of some shapes it is, from 1, if it counts; 0: none."""
         rows = np.zeros(len(self.rows), np.uint32)
-        rows[shapes] = 1 + np.arange(len(shapes))
+        rows[shapes] = np.where(count, 1 + np.arange(len(shapes)), 0)
         return owned(mi.UInt32, rows)
 
     def flat_planes(self, frame: float) -> np.ndarray:
@@ -152,9 +152,11 @@ class Images:
                          for mirror, plane in self._flat + self._thin]).reshape(-1, 2, 3)
 
     def balls(self, frame: float) -> np.ndarray:
-        """(n, 4) centre and radius of each of `round`, world space."""
+        """(n, 4) centre and radius of each of `round`, world space; 0 where a matrix mirrors one,
+        as Mitsuba turns its normals inside out then."""
         places = [ball.world_from_object_at(frame) for ball in self._round]
-        return np.array([[*place[:3, 3], np.linalg.norm(place[:3, 0])]
+        return np.array([[*place[:3, 3], np.linalg.norm(place[:3, 0])
+                          * (np.linalg.det(place[:3, :3]) > 0)]
                          for place in places]).reshape(-1, 4)
 
     def boxes(self, frame: float) -> np.ndarray:

@@ -261,7 +261,8 @@ class MitsubaScene:
 
     def balls(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Registry indices (m,) uint32 of smooth balls, (m, 4) their centres and radii in the
-        stage, at the current frame, and (m,) indices of refraction, 0 for metal."""
+        stage, at the current frame, and (m,) indices of refraction, 0 for metal; radii are 0 of
+        what does not count."""
         places = self.images.balls(self.frame)
         places[:, :3] -= self.origin
         return (np.array(self.images.round, np.uint32), (places / self.unit).astype(np.float32),

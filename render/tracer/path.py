@@ -193,11 +193,11 @@ def trace(scene: mi.Scene, ray: mi.Ray3f, pi: mi.PreliminaryIntersection3f, samp
             straight += dr.select(course.is_straight, found, 0)
             course = course.after(si, bsdf_sample, 1.0 if opacity is None else
                                   dr.select(depth == 0, opacity, 1), bent)
-        origin, is_same = origin.after(si, bsdf_sample, panes, mirrors, balls, seeks, inner,
+        origin, goes_on = origin.after(si, bsdf_sample, panes, mirrors, balls, seeks, inner,
                                        depth == 0)
         if dr.hint(events is not None, mode="scalar"):
             assert events is not None
-            events += dr.select(is_same, mi.UInt32(0), 1)
+            events += dr.select(goes_on, mi.UInt32(0), 1)
         active = inner & (dr.max(beta) > 0)
         depth += 1
         if dr.hint(max_depth > SHORT, mode="scalar"):

@@ -40,7 +40,7 @@ from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.sampler import Sampler
 
 from .panes import is_far
-from .slabs import WORDS, Between, find_slabs
+from .slabs import FACING, FAR, WORDS, Between, find_slabs
 from .strata import power_heuristic
 
 
@@ -70,15 +70,12 @@ class Mirrors:
         n, _ = self.plane(mirror, active)
         return direction - 2 * dr.dot(n, direction) * n
 
-    def on_one_side(self, mirror: mi.UInt32, a: mi.Point3f, b: mi.Point3f,
-                    active: mi.Bool) -> mi.Bool:
-        """Whether two points are on one side of a mirror."""
-        return self.height(mirror, a, active) * self.height(mirror, b, active) > 0
-
-    def height(self, mirror: mi.UInt32, point: mi.Point3f, active: mi.Bool) -> mi.Float:
-        """Of a point above a mirror."""
+    def heights(self, mirror: mi.UInt32, x: mi.Point3f, light: mi.DirectionSample3f,
+                active: mi.Bool) -> tuple[mi.Float, mi.Float]:
+        """Of a vertex and of a point of a light above a mirror; the sky is far on its side."""
         n, d = self.plane(mirror, active)
-        return mi.Float(dr.dot(n, point) - d)
+        return mi.Float(dr.dot(n, x) - d), dr.select(
+            is_far(light), mi.Float(dr.dot(n, light.d)) * FAR, mi.Float(dr.dot(n, light.p) - d))
 
     def row(self, shape: mi.ShapePtr, active: mi.Bool) -> mi.UInt32:
         """Of a shape, the first if there are two."""
@@ -93,7 +90,7 @@ class Mirrors:
         is_slab = thickness > 0
         n, _ = self.plane(row - 1, is_slab)
         cosine = mi.Float(dr.dot(n, si.n))
-        return dr.select(is_slab, dr.select(dr.abs(cosine) > 1 - 1e-4,
+        return dr.select(is_slab, dr.select(dr.abs(cosine) > FACING,
                                             dr.select(cosine > 0, row, row + 1), 0), row)
 
     def slab(self, mirror: mi.UInt32, active: mi.Bool) -> tuple[mi.Float, mi.Float]:
@@ -146,7 +143,7 @@ def find_mirrors(stage: MitsubaScene) -> Mirrors | None:
     glass = np.zeros((len(planes), 2), np.float32)
     glass[len(shapes):] = np.repeat(words[:, 15:WORDS], 2, 0)
     rows = np.array(stage.images.numbered(shapes))
-    rows[slabs] = len(shapes) + 1 + 2 * np.arange(len(slabs))
+    rows[slabs] = np.where(thickness[:, 0] > 0, len(shapes) + 1 + 2 * np.arange(len(slabs)), 0)
     return Mirrors(owned(mi.UInt32, np.append(shapes, np.repeat(slabs, 2))),
                    owned(mi.Float, planes.ravel()), owned(mi.UInt32, rows), len(planes),
                    owned(mi.Float, glass.ravel()))
@@ -168,12 +165,12 @@ def light_in_mirrors(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Samp
     image.time, image.wavelengths = si.time, si.wavelengths
     light, weight = scene.sample_emitter_direction(image, sampler.next_2d(), False, active)
     toward, pdf, behind = light.d, light.pdf, mi.Bool(False)
-    possible = mirrors.on_one_side(mirror, si.p, light.p, active)
+    own, height = mirrors.heights(mirror, si.p, light, active)
+    possible = own * height > 0
     if dr.hint(mirrors.glass is not None, mode="scalar"):
         thickness, _ = mirrors.slab(mirror, active)
-        heights = [mirrors.height(mirror, point, active) for point in (si.p, light.p)]
-        behind = (thickness > 0) & (heights[0] < 0)
-        possible &= ~behind | ((dr.maximum(*heights) < -thickness) & (left > 4))
+        behind = (thickness > 0) & (own < 0)
+        possible &= ~behind | ((dr.maximum(own, height) < -thickness) & (left > 4))
         toward, ratio = mirrors.unfolded(mirror, light.d, light.dist, is_far(light), light.n,
                                          behind)
         pdf, weight = pdf * ratio, weight / ratio

@@ -72,7 +72,7 @@ class Origin:
     def after(self, si: mi.SurfaceInteraction3f, sample: mi.BSDFSample3f, panes: Panes | None,
               mirrors: Mirrors | None, balls: Balls | None, seeks: mi.Bool, active: mi.Bool,
               is_first: mi.Bool | None = None) -> tuple[Origin, mi.Bool]:
-        """Behind a surface, and whether it is the one before it still.
+        """Behind a surface, and whether that was no scattering event.
 
         Args:
             panes: what light goes through; mirrors, balls: None where that is not.
@@ -81,7 +81,7 @@ class Origin:
         """
         is_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
         p, is_same, sought, share, by = self.p, mi.Bool(False), None, None, None
-        gone, shown = None, None
+        gone, shown, reflects = None, None, mi.Bool(False)
         if panes is not None:
             assert self.gone is not None
             gone, is_same = self.gone.after(si, sample, panes, active)
@@ -112,7 +112,7 @@ class Origin:
                     by.is_first = dr.select(is_same, by.is_first, is_first)
         return Origin(dr.select(is_same, p, si.p), dr.select(is_same, self.pdf, sample.pdf),
                       dr.select(is_same, self.from_delta, is_delta), sought, share, by,
-                      gone, shown), is_same
+                      gone, shown), is_same & ~reflects
 
 
 @dataclass

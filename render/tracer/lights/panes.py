@@ -93,23 +93,28 @@ def passage(scene: mi.Scene, si: mi.SurfaceInteraction3f, point: mi.Point3f, far
     which = mi.UInt32(0)
     through, distance = mi.Color3f(dr.select(active, 1, 0)), mi.Float(0)
     shape, face = mi.UInt32(0), mi.UInt32(0)
-    crossed, inside = mi.UInt32(0), mi.UInt32(0)
+    has_slabs: bool = panes.slabs is not None
+    crossed: Any = mi.UInt32(0) if has_slabs else None
+    inside: Any = mi.UInt32(0) if has_slabs else None
     ray, left, going = si.spawn_ray_to(point), mi.UInt32(most), mi.Bool(active)
-    if dr.hint(panes.slabs is not None, mode="scalar"):
+    if dr.hint(has_slabs, mode="scalar"):
         straight = point - si.p
         length = dr.norm(straight)
         which = panes.slabs.between(si.p, straight / length, length, far, active).which
         ray = dr.select(which != 0, si.spawn_ray(toward), ray)
-    while dr.hint(going, exclude=[scene, si, point, far, which, panes, active], label="panes"):
+    while dr.hint(going, exclude=[scene, si, point, far, which, panes, has_slabs, active],
+                  label="panes"):
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=going)
         met = going & pi.is_valid()
         here = pi.compute_surface_interaction(ray, mi.RayFlags.All, met)
         index = shape_index(pi.shape, met)
         asked = met & (left > 0) & (dr.gather(mi.UInt32, panes.clear, index, met) != 0)
+        if dr.hint(has_slabs, mode="scalar"):
+            asked &= inside == 0
         share = here.bsdf().eval_null_transmission(here, asked)
         passes = asked & (dr.max(share) > 0)
         onward = here.spawn_ray_to(point)
-        if dr.hint(panes.slabs is not None, mode="scalar"):
+        if dr.hint(has_slabs, mode="scalar"):
             at = panes.slabs.crossing(here, inside, met & (left > 0))
             crosses = (at.bit & which) != 0
             sample, weight = here.bsdf().sample(mi.BSDFContext(), here, 1, mi.Point2f(0.5), crosses)
@@ -129,7 +134,7 @@ def passage(scene: mi.Scene, si: mi.SurfaceInteraction3f, point: mi.Point3f, far
         ray = onward
         left -= dr.select(passes, mi.UInt32(1), 0)
         going = passes
-    if dr.hint(panes.slabs is not None, mode="scalar"):
+    if dr.hint(has_slabs, mode="scalar"):
         through = dr.select(crossed == which, through, 0)
     return Passage(through, distance, shape, face)
 

@@ -7,8 +7,9 @@ glass of the distance along n, L the distance across it and tau the tangent of t
 
     g(tau) = A tau + T tau / sqrt(eta^2 + (eta^2 - 1) tau^2) = L,
 
-which Newton's method finds from the straight line's L / (A + T) on: g is concave, so no step goes
-beyond. A beam of a solid angle at x has at y, across the way, that times
+which Newton's method finds from max(L / (A + T), (L - T / sqrt(eta^2 - 1)) / A) on, neither of
+which is above it: g is concave, so no step goes beyond. A beam of a solid angle at x has at y,
+across the way, that times
 
     R^2 = (A / cos + T / sqrt(eta^2 - sin^2)) g'(tau) / cos,   g' = A + T eta^2 / sqrt(...)^3,
 
@@ -36,9 +37,11 @@ from onespp.render.mitsuba.scene import MitsubaScene
 from onespp.render.mitsuba.variant import mi
 
 WORDS = 17  # of a slab in the table: centre, rows, normal, thickness, index of refraction
-_STEPS = 4  # of Newton's method: the rest is below rounding
-_ALIKE = 1e-4  # by how much cosines and indices of what is parallel and alike differ at most
-_FAR = 1e12  # distance of the sky
+_STEPS = 8  # of Newton's method
+_SOLVED = 1e-4  # share of L by which g may be off: else such a way is left to chance
+_ALIKE = 1e-6  # by how much cosines and indices of what is parallel and alike differ at most
+FACING = 1 - 1e-4  # least cosine between the normals of a slab's side and of a face of it
+FAR = 1e12  # distance of the sky
 
 
 @dataclass
@@ -69,11 +72,14 @@ class Between:
         sine = dr.norm(across)
         length, depth = distance * sine, distance * dr.abs(along)
         glass, square = self.thickness, dr.square(self.index)
-        air, tangent, slope = depth - glass, length / depth, mi.Float(1)
-        for _ in range(_STEPS):
+        air, missed, slope = depth - glass, mi.Float(0), mi.Float(1)
+        tangent = dr.maximum(length / depth, (length - glass * dr.rsqrt(square - 1)) / air)
+        for step in range(_STEPS + 1):
             root = dr.rsqrt(square + (square - 1) * dr.square(tangent))
             slope = air + glass * square * root * dr.square(root)
-            tangent -= (air * tangent + glass * tangent * root - length) / slope
+            missed = air * tangent + glass * tangent * root - length
+            if step < _STEPS:
+                tangent -= missed / slope
         cosine = dr.rsqrt(1 + dr.square(tangent))
         bent_sine = tangent * cosine
         toward = (dr.select(along > 0, cosine, -cosine) * self.normal
@@ -82,9 +88,9 @@ class Between:
                    / cosine)
         ratio = squared / dr.square(distance) * dr.abs(dr.dot(n, d) / dr.dot(n, toward))
         bends = (self.which != 0) & ~is_far
+        is_way = dr.isfinite(ratio) & (dr.abs(missed) <= _SOLVED * length)
         return (dr.select(bends, toward, d),
-                dr.select(self.lost | (bends & ~dr.isfinite(ratio)), 0,
-                          dr.select(bends, ratio, 1)))
+                dr.select(self.lost | (bends & ~is_way), 0, dr.select(bends, ratio, 1)))
 
 
 @dataclass
@@ -101,7 +107,7 @@ class Slabs:
     def between(self, x: mi.Point3f, d: mi.Vector3f, distance: mi.Float, is_far: mi.Bool,
                 active: mi.Bool) -> Any:
         """Slabs between a vertex and a point of a light; arguments as of `Between.bent`."""
-        distance = dr.select(is_far, mi.Float(_FAR), distance)
+        distance = dr.select(is_far, mi.Float(FAR), distance)
         found = Between(mi.UInt32(0), mi.Bool(False), mi.Vector3f(0, 0, 1), mi.Float(0),
                         mi.Float(1))
         k, asks = mi.UInt32(0), mi.Bool(active)
@@ -136,7 +142,7 @@ class Slabs:
         there = active & (row != 0)
         normal = mi.Vector3f(*(dr.gather(mi.Float, self.table, WORDS * (row - 1) + i, there)
                                for i in (12, 13, 14)))
-        faces = there & (dr.abs(mi.Float(dr.dot(normal, si.n))) > 1 - _ALIKE)
+        faces = there & (dr.abs(mi.Float(dr.dot(normal, si.n))) > FACING)
         return Crossing(row, faces & (inside == 0) & (si.wi.z > 0),
                         faces & (inside == row) & (si.wi.z < 0))
 

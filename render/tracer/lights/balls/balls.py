@@ -46,7 +46,8 @@ class Seen:
     @property
     def per_angle(self) -> mi.Float:
         """One over its solid angle."""
-        return dr.rcp(dr.two_pi * (1 - dr.safe_sqrt(1 - dr.square(self.near))))
+        square = dr.square(self.near)
+        return (1 + dr.safe_sqrt(1 - square)) / (dr.two_pi * square)
 
     @property
     def is_outside(self) -> mi.Bool:
@@ -208,7 +209,7 @@ def find_balls(stage: MitsubaScene) -> Balls | None:
     shapes, places, indices = stage.balls()
     lights, bounds = _around_lights(stage.mi_scene)
     return Balls(owned(mi.UInt32, shapes), owned(mi.Float, places.ravel()),
-                 owned(mi.Float, indices), stage.images.numbered(shapes),
+                 owned(mi.Float, indices), stage.images.numbered(shapes, places[:, 3] > 0),
                  tuple(bool(index > 0) for index in indices), lights, bounds)
 
 

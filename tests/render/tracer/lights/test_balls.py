@@ -271,6 +271,21 @@ def test_what_may_shine_is_what_does(lamps):
     assert np.array(sky.may_shine(start, d)).all()
 
 
+def test_a_ball_that_a_matrix_mirrors_does_not_count():
+    """Mitsuba turns its normals inside out."""
+    place = translate((0.2, 0.55, 0)) @ scale((-0.5, 0.5, 0.5))
+    renderer = Renderer(scene(Shape("ball", Sphere(), glass(), lambda f: (
+        place if f == 1 else translate((0.2, 0.55, 0)) @ scale(0.5))), size=0.3), HEIGHT, WIDTH)
+    for frame, count in ((0, 1), (1, 0)):
+        renderer.frame(frame, 0, ("caustic",))
+        balls = renderer.balls
+        assert balls is not None
+        assert (np.array(balls.rows) > 0).sum() == count
+        caustic = np.stack([renderer.frame(frame, k, ("caustic",))["caustic"] for k in range(20)])
+        assert np.isfinite(caustic).all()
+        assert (caustic.max() > 0) == (count == 1)
+
+
 def _near_lamp() -> Scene:
     """A lamp at a ball, which it lights from the side; the floor sees it edge on."""
     lamp = Shape("lamp", Rectangle(), diffuse((0.0, 0.0, 0.0)),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -58,7 +60,8 @@ SPOT[2:4, 8:11] = 40
     ((slab("one", 1.2), slab("two", 1.9, 30, index=1.3)), None),       # left to chance
     ((slab("thick", 1.5, 10, (1, 0.9, 1.2)),), None),                  # many come out at a side
     ((MOVING, Shape("sheet", Rectangle(), pane(), translate((0, 1, 0)) @ rotate(X, 90))), None),
-    ((slab("flat", 1.5, 15),), SPOT)])
+    ((slab("flat", 1.5, 15),), SPOT),
+    ((Shape("wall", box((5, 3, 1.2)), glass(), translate((0, 1.5, -1.2))),), SPOT)])
 def test_paths_have_the_mean_of_mitsubas_path(things, environment):
     renderer = Renderer(under(*things, lamp=1.2, environment=environment), HEIGHT, WIDTH)
     assert renderer.panes is not None
@@ -85,7 +88,10 @@ BLOCKS = tuple(Shape(f"block{i}", box((0.4, 0.35, 0.4)), glass(3.0),
     (Shape("wall", box((2, 1.6, 0.1)), glass(), translate((0, 0.8, -0.8)) @ rotate(X, 20)),
      Shape("sheet", Rectangle(), pane(1.8), translate((-0.9, 0.5, 0)) @ rotate((0, 1, 0), 70)),
      Shape("metal", Rectangle(), mirror(), translate((0.9, 0.5, 0)) @ rotate((0, 1, 0), -70)),
-     slab("above", 1.0, 5), LAMP)])
+     slab("above", 1.0, 5), LAMP),
+    (slab("thick", 0.75, 0, (2, 0.5, 2)), LAMP,                         # with a pane in it
+     Shape("in it", Rectangle(), pane(), translate((0, 0.75, 0)) @ rotate(X, 90) @ scale(0.7))),
+    (slab("close", 0.755, 0, (5, 1.49, 5)), LAMP)])                     # to floor and lamp
 def test_what_goes_another_way_is_left_to_chance(things, monkeypatch):
     """Thick slabs below a large lamp, with references of which chance knows much."""
     def rendered(seed: int) -> list[np.ndarray]:
@@ -107,6 +113,31 @@ def test_no_path_is_longer_than_it_may_be(monkeypatch):
     ours = rendered(0)
     leave_to_chance(monkeypatch)
     assert_same_mean(*mean_and_variance(ours), *mean_and_variance(rendered(1)))
+
+
+def test_what_a_mirror_shows_of_many_lamps_is_whole():
+    """Where there are panes, too: a reflection is a scattering event, so that no lamp in it counts
+    as direct light, which of several lamps is weighed otherwise."""
+    lamps = [Shape(f"lamp{i}", Rectangle(), diffuse((0.0, 0.0, 0.0)),
+                   translate((0.6 * i - 1.2, 0.6, 0.9)) @ rotate((0, 1, 0), 180)
+                   @ scale((0.3, 0.6, 1)), (9.0, 6.0, 3.0)) for i in range(5)]
+    metal = Shape("metal", Rectangle(), mirror(), translate((0, 1, -0.4)) @ scale((3, 2, 1)))
+    above = Camera(look_at((0, 2.5, 1), (0, 0, 0)), fov=50)
+
+    things = under(slab("aside", 2, 0, (0.1, 0.01, 0.1)), metal, *lamps, lamp=0.01, depth=3)
+    renderer = Renderer(replace(things, camera=above), HEIGHT, WIDTH, direct="resampled")
+    frames = [renderer.frame(0, k, ("color",))["color"].mean((0, 1)) for k in range(800)]
+    truth = [renderer.sample_sum(0, 1, k, 256).mean((0, 1)) / 256 for k in range(12)]
+    assert_same_mean(*mean_and_variance(frames), *mean_and_variance(truth))
+
+
+@pytest.mark.parametrize("linear", [scale(0.0), scale((1, 0, 1))])
+def test_a_slab_may_have_no_volume_for_a_frame(linear):
+    shape = Shape("gone", box((1, 0.3, 1)), glass(), lambda f: (
+        translate((0, 1, 0)) @ (linear if f == 1 else scale(1))))
+    renderer = Renderer(under(shape, lamp=0.5), HEIGHT, WIDTH)
+    for frame in (0, 1, 0):
+        assert np.isfinite(renderer.frame(frame, 0, ("color",))["color"]).all()
 
 
 def test_what_later_vertices_leave_to_chance_is_whole():
