@@ -56,3 +56,13 @@ def test_words_tell_the_thinnest_side():
     np.testing.assert_allclose(np.linalg.norm(normal), 1, rtol=1e-6)
     assert words[15] < 0.12
     assert words[16] == 1.5
+
+
+def test_what_has_no_volume_has_no_words():
+    """A box that a motion flattens, or shrinks to nothing, for a frame."""
+    found = half_edges(box((2, 0.1, 3)))
+    assert found is not None
+    boxes = np.stack([0 * found, found * (1, 0, 1), found])
+    words = slab_words(boxes, np.array([1.5, 1.5, 1.5]))
+    assert not words[:2].any()
+    assert words[2].any()
