@@ -8,7 +8,7 @@ from typing import Any, Generic, ParamSpec, TypeVar, cast
 
 import drjit as dr
 
-from onespp.render.host.recorded import no_collection
+from onespp.render.host.turns import no_collection
 
 from .structure import Form, build, flatten
 from .taps import Taps

@@ -8,9 +8,7 @@ at once. What a recorded function reads is among its arguments, in memory of Dr.
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -44,8 +42,7 @@ class Recorded:
             arrays: list[Any] = []
             given.arguments, given.form = arguments, _form(arguments, arrays)
             try:
-                with no_collection():
-                    return self._frozen(scene, arrays)
+                return self._frozen(scene, arrays)
             except RuntimeError as error:  # it wraps others, also an interrupt
                 if not str(error).startswith("record()"):
                     raise
@@ -87,16 +84,3 @@ def _form(value: Any, arrays: list[Any]) -> Any:
     if kind in (tuple, list):
         return kind, *(_form(part, arrays) for part in value)
     return value
-
-
-@contextmanager
-def no_collection() -> Iterator[None]:
-    """Keeps Python's cycle collector away: an array that it frees while Dr.Jit records ends the
-    process (`enqueue_host_func(): this function cannot be recorded`)."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()

@@ -1,4 +1,5 @@
-"""Turns at Dr.Jit: one thread at a time, never interrupted halfway, never in a forked process.
+"""Turns at Dr.Jit: one thread at a time, never interrupted halfway, never in a forked process, and
+never while Python's cycle collector frees what it may be at.
 
 Dr.Jit records kernels in one state for the process, and an interrupt while it traces a loop leaves
 that in a bad state. So whatever traces or runs kernels does it in a turn: threads wait for each
@@ -8,6 +9,7 @@ A forked process has none of Dr.Jit's threads and would wait for them for ever; 
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -52,13 +54,28 @@ def turn() -> Iterator[None]:
             if _Turns.depth > 1:
                 yield
                 return
-            with _interrupts_after():
+            with _interrupts_after(), no_collection():
                 try:
                     yield
                 finally:
                     _finish()
         finally:
             _Turns.depth -= 1
+
+
+@contextmanager
+def no_collection() -> Iterator[None]:
+    """Keeps Python's cycle collector away. An array that it frees while Dr.Jit records, or a scene
+    that it frees while Dr.Jit traces, which calls fewer functions then than a moment before, ends
+    the process (`enqueue_host_func(): this function cannot be recorded`, `invalid redefinition of
+    function`)."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def check_process() -> None:

@@ -224,3 +224,39 @@ if __name__ == "__main__":
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True,
                           timeout=300)
     assert done.stdout == "equal\n", done.stderr
+
+
+COLLECTED_WHILE_TRACING = """
+import gc
+import onespp, onespp.render
+from onespp.render.tracer import path
+from onespp.render.tracer.renderer import Renderer
+from onespp.scenes import catalog
+
+class Cycle:
+    pass
+
+kept = Cycle()
+kept.itself, kept.other = kept, Renderer(catalog.load("generated/3"), 4, 4)  # of other emitters
+kept.other.frame(0, 0)
+found_light = path.found_light
+
+def collecting(*args, **options):
+    global kept
+    kept = None
+    if gc.isenabled():
+        gc.collect()
+    return found_light(*args, **options)
+
+path.found_light = collecting
+image = Renderer(catalog.load("box"), 4, 4).sample_sum(0, 0, 0, 2)
+assert kept is None and gc.isenabled()
+print(image.mean() > 0)
+"""
+
+
+def test_scenes_in_reference_cycles_are_not_freed_while_another_is_traced():
+    """Dr.Jit aborts when one is, so this runs in a process of its own."""
+    done = run(COLLECTED_WHILE_TRACING)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout.split() == ["True"]

@@ -277,10 +277,13 @@ def test_a_ball_that_a_matrix_mirrors_does_not_count():
     renderer = Renderer(scene(Shape("ball", Sphere(), glass(), lambda f: (
         place if f == 1 else translate((0.2, 0.55, 0)) @ scale(0.5))), size=0.3), HEIGHT, WIDTH)
     for frame, count in ((0, 1), (1, 0)):
-        renderer.stage.set_frame(frame)
+        renderer.frame(frame, 0, ("caustic",))
         balls = renderer.balls
         assert balls is not None
         assert (np.array(balls.rows) > 0).sum() == count
+        caustic = np.stack([renderer.frame(frame, k, ("caustic",))["caustic"] for k in range(20)])
+        assert np.isfinite(caustic).all()
+        assert (caustic.max() > 0) == (count == 1)
 
 
 def _near_lamp() -> Scene:

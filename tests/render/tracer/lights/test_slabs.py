@@ -131,6 +131,15 @@ def test_what_a_mirror_shows_of_many_lamps_is_whole():
     assert_same_mean(*mean_and_variance(frames), *mean_and_variance(truth))
 
 
+@pytest.mark.parametrize("linear", [scale(0.0), scale((1, 0, 1))])
+def test_a_slab_may_have_no_volume_for_a_frame(linear):
+    shape = Shape("gone", box((1, 0.3, 1)), glass(), lambda f: (
+        translate((0, 1, 0)) @ (linear if f == 1 else scale(1))))
+    renderer = Renderer(under(shape, lamp=0.5), HEIGHT, WIDTH)
+    for frame in (0, 1, 0):
+        assert np.isfinite(renderer.frame(frame, 0, ("color",))["color"]).all()
+
+
 def test_what_later_vertices_leave_to_chance_is_whole():
     """In a white room with a wall of glass and one of metal: later vertices of a frame's path look
     into no mirror, those of a reference's do."""
