@@ -8,6 +8,7 @@ import numpy as np
 
 from onespp.scenes.description import Cylinder, Disk, Mesh, Rectangle, Sphere
 
+_FACES = 12  # triangles of six sides, without corners in between
 _SAME = 1e-5  # distance of places that are one, as a share of a mesh's size
 _NONE = 1e-9  # volume, as a share of that of a box of such edges
 _FLAT = 1e-3  # of a shading normal from that of its face, at most
@@ -16,7 +17,7 @@ _FLAT = 1e-3  # of a shading normal from that of its face, at most
 def half_edges(geometry: Sphere | Rectangle | Disk | Cylinder | Mesh) -> np.ndarray | None:
     """(4, 3) centre and half edges of a box in object space, whatever its angles are; None of what
     is none, or not shaded flat."""
-    if not isinstance(geometry, Mesh):
+    if not isinstance(geometry, Mesh) or len(geometry.faces) != _FACES:
         return None
     vertices = geometry.vertices
     size = float(np.ptp(vertices, axis=0).max())

@@ -48,9 +48,9 @@ class Images:
         rows: (registry indices) uint32, which row of images is in a shape, from 1; 0: none.
         masks: (registry indices) uint32, 1 for shapes cut out by a mask. clear: the same, for those
             that let light straight through. bent: the same, for glass that is no pane.
-        flat: registry indices of flat mirrors that nothing but their shape bends. thin: of flat
-            panes without thickness, which reflect as well. round: of smooth
-            spheres, of metal or denser than what is around. index: (round,) of refraction, 0: none.
+        flat: registry indices of flat mirrors that nothing but their shape bends, and then of flat
+            panes without thickness, which mirror as well. round: of smooth spheres, of metal or
+            denser than what is around. index: (round,) of refraction, 0: none.
         slabs: of boxes of smooth glass without maps. slab_index: (slabs,) of refraction.
         in_several: the row of what is seen in one after another. layered: whether anything lets
             light through.
@@ -70,26 +70,20 @@ class Images:
         listed = sorted(by_size[:most], key=names.__getitem__)
         self._mirrors = [by_name[names[i]] for i in listed]
         self._planes = [_plane(shape) for shape in self._mirrors]
-        flat = [(index, mirror, plane) for index, mirror, plane
+        flat = [(index, mirror, plane) for is_so in (_is_plain, _is_pane) for index, mirror, plane
                 in zip(listed, self._mirrors, self._planes)
-                if plane is not None and _is_plain(shapes[index].bsdf())]
+                if plane is not None and is_so(shapes[index].bsdf())]
         self.flat = [index for index, *_ in flat]
         self._flat = [(mirror, plane) for _, mirror, plane in flat]
-        thin = [(index, mirror, plane) for index, mirror, plane
-                in zip(listed, self._mirrors, self._planes)
-                if plane is not None and shapes[index].bsdf().class_name() == "ThinDielectric"]
-        self.thin = [index for index, *_ in thin]
-        self._thin = [(mirror, plane) for _, mirror, plane in thin]
         round_ = [(index, mirror, _of_refraction(shapes[index].bsdf())) for index, mirror
                   in zip(listed, self._mirrors)
                   if isinstance(mirror.geometry, Sphere) and not mirror.geometry.flipped]
         round_ = [(index, ball, eta) for index, ball, eta in round_ if eta is not None]
         self.round, self._round = [i for i, *_ in round_], [ball for _, ball, _ in round_]
         self.index = np.array([eta for *_, eta in round_], np.float32)
-        slabs = [(index, mirror, edges, _of_refraction(shapes[index].bsdf()))
-                 for index, mirror in zip(listed, self._mirrors)
-                 if (edges := half_edges(mirror.geometry)) is not None]
-        slabs = [slab for slab in slabs if slab[3]]
+        slabs = [(index, mirror, edges, eta) for index, mirror in zip(listed, self._mirrors)
+                 if (eta := _of_refraction(shapes[index].bsdf()))
+                 and (edges := half_edges(mirror.geometry)) is not None]
         self.slabs = [index for index, *_ in slabs]
         self._slabs = [(slab, edges) for _, slab, edges, _ in slabs]
         self.slab_index = np.array([eta for *_, eta in slabs], np.float32)
@@ -147,9 +141,9 @@ class Images:
         return owned(mi.UInt32, rows)
 
     def flat_planes(self, frame: float) -> np.ndarray:
-        """(n, 2, 3) a point and the unit normal of each of `flat` and `thin`, world space."""
+        """(n, 2, 3) a point and the unit normal of each of `flat`, world space."""
         return np.array([_plane_at(mirror.world_from_object_at(frame), *plane)
-                         for mirror, plane in self._flat + self._thin]).reshape(-1, 2, 3)
+                         for mirror, plane in self._flat]).reshape(-1, 2, 3)
 
     def balls(self, frame: float) -> np.ndarray:
         """(n, 4) centre and radius of each of `round`, world space; 0 where a matrix mirrors one,
@@ -233,6 +227,11 @@ def _is_plain(bsdf: mi.BSDF) -> bool:
     kind = bsdf.class_name()
     return kind == "SmoothConductor" or (kind == "TwoSidedBRDF" and all(map(_is_plain,
                                                                             nested(bsdf))))
+
+
+def _is_pane(bsdf: mi.BSDF) -> bool:
+    """Whether a surface is glass without thickness, without maps."""
+    return bsdf.class_name() == "ThinDielectric"
 
 
 def _of_refraction(bsdf: mi.BSDF) -> float | None:

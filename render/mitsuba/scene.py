@@ -256,7 +256,7 @@ class MitsubaScene:
         found = self.images.flat_planes(self.frame)
         point, normal = (found[:, 0] - self.origin) / self.unit, found[:, 1]
         distance = (point * normal).sum(-1, keepdims=True)
-        return (np.array(self.images.flat + self.images.thin, np.uint32),
+        return (np.array(self.images.flat, np.uint32),
                 np.concatenate([normal, distance], -1).astype(np.float32))
 
     def balls(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

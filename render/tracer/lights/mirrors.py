@@ -40,7 +40,7 @@ from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.sampler import Sampler
 
 from .panes import is_far
-from .slabs import FACING, FAR, WORDS, Between, find_slabs
+from .slabs import FACING, FAR, WORDS, Between, goes_through_slabs
 from .strata import power_heuristic
 
 
@@ -128,8 +128,8 @@ class Mirrors:
 
 def find_mirrors(stage: MitsubaScene) -> Mirrors | None:
     """Of a scene, at its frame; None where there are none."""
-    has_slabs = find_slabs(stage) is not None
-    if not (stage.images.flat or stage.images.thin or has_slabs):
+    has_slabs = goes_through_slabs(stage)
+    if not (stage.images.flat or has_slabs):
         return None
     shapes, planes = stage.flat_mirrors()
     if not has_slabs:
@@ -216,12 +216,18 @@ def _reflected(scene: mi.Scene, ray: mi.Ray3f, mirrors: Any, mirror: mi.UInt32, 
 
 def _met(scene: mi.Scene, ray: mi.Ray3f, mirrors: Mirrors, mirror: mi.UInt32,
          active: mi.Bool) -> mi.SurfaceInteraction3f:
-    """Where a ray meets a mirror that nothing hides; not valid where it does not."""
-    pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-    wanted = dr.gather(mi.UInt32, mirrors.shapes, mirror, active)
-    met = active & pi.is_valid()
-    met &= shape_index(pi.shape, met) == wanted
-    si = pi.compute_surface_interaction(ray, mi.RayFlags.All, met)
+    """`met_shape` of a mirror: of a slab, that side."""
+    si = met_shape(scene, ray, dr.gather(mi.UInt32, mirrors.shapes, mirror, active), active)
     if mirrors.glass is not None:
-        si.t = dr.select(mirrors.row_at(si, met) == mirror + 1, si.t, dr.inf)
+        si.t = dr.select(mirrors.row_at(si, si.is_valid()) == mirror + 1, si.t, dr.inf)
     return si
+
+
+def met_shape(scene: mi.Scene, ray: mi.Ray3f, shape: mi.UInt32,
+              active: mi.Bool) -> mi.SurfaceInteraction3f:
+    """Where a ray meets a shape, by its index in the JIT registry, that nothing hides; not valid
+    where it does not."""
+    pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+    met = active & pi.is_valid()
+    met &= shape_index(pi.shape, met) == shape
+    return pi.compute_surface_interaction(ray, mi.RayFlags.All, met)

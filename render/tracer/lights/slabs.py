@@ -166,11 +166,16 @@ class Crossing:
         return dr.select(self.leaves, self.bit, 0)
 
 
-def find_slabs(stage: MitsubaScene) -> Slabs | None:
-    """Of a scene, at its frame. None where there are none, or light is looked for by way of balls:
-    what comes by both kinds is not known to either."""
+def goes_through_slabs(stage: MitsubaScene) -> bool:
+    """Whether light does in a scene: not where it is looked for by way of balls, as what comes by
+    both kinds is not known to either."""
     images = stage.images
-    if not images.slabs or (images.round and stage.clear is None):
+    return bool(images.slabs) and not (images.round and stage.clear is None)
+
+
+def find_slabs(stage: MitsubaScene) -> Slabs | None:
+    """Of a scene, at its frame; None where light goes through none."""
+    if not goes_through_slabs(stage):
         return None
     shapes, table = stage.slabs()
-    return Slabs(owned(mi.Float, table.ravel()), images.numbered(shapes), len(shapes))
+    return Slabs(owned(mi.Float, table.ravel()), stage.images.numbered(shapes), len(shapes))

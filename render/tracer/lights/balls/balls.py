@@ -215,10 +215,11 @@ def find_balls(stage: MitsubaScene) -> Balls | None:
 
 def _around_lights(scene: mi.Scene) -> tuple[mi.Float | None, int]:
     """`lights` and `bounds` of `Balls`."""
-    shapes = [emitter.get_shape() for emitter in scene.emitters()]
-    boxes = [shape.bbox() for shape in shapes if shape is not None]
-    if scene.environment() is not None or len(boxes) > _MOST_LIGHTS:
+    emitters = scene.emitters()
+    if scene.environment() is not None or len(emitters) > _MOST_LIGHTS:
         return None, 0
+    shapes = [emitter.get_shape() for emitter in emitters]
+    boxes = [shape.bbox() for shape in shapes if shape is not None]
     corners = np.array([[box.min, box.max] for box in boxes], np.float64).reshape(-1, 2, 3)
     if len(corners) > _BOUNDED:
         corners = np.stack([corners[:, 0].min(0), corners[:, 1].max(0)])[None]

@@ -33,8 +33,9 @@ from typing import Any
 
 import drjit as dr
 
-from onespp.render.mitsuba.images import shape_index
 from onespp.render.mitsuba.variant import mi
+from onespp.render.tracer.lights.mirrors import met_shape
+from onespp.render.tracer.lights.panes import is_far
 from onespp.render.tracer.lights.reservoir import offered
 from onespp.render.tracer.lights.strata import power_heuristic
 from onespp.render.tracer.sampler import Sampler
@@ -162,7 +163,7 @@ def _to_a_point(scene: mi.Scene, si: mi.SurfaceInteraction3f, place: mi.Point2f,
     """All ways by a ball to a point of a light."""
     centre = _centre(si, seen)
     light, weight = scene.sample_emitter_direction(centre, place, False, active)
-    far = mi.has_flag(light.emitter.flags(), mi.EmitterFlags.Infinite)
+    far = is_far(light)
     ways = seen.ways_to(light.dist, far)
     lit = active & (light.pdf != 0) & ~light.delta & ways.possible
 
@@ -238,12 +239,12 @@ def _brought(scene: mi.Scene, si: mi.SurfaceInteraction3f, balls: Balls, picked:
     value, p = si.bsdf().eval_pdf(context, si, si.to_local(way.onward), active)
     seeks = active & (picked.total > 0) & (dr.max(value) > 0)
     wanted = dr.gather(mi.UInt32, balls.shapes, way.ball, seeks)
-    there = _met(scene, si.spawn_ray(way.onward), wanted, seeks)
+    there = met_shape(scene, si.spawn_ray(way.onward), wanted, seeks)
     sample, passed = there.bsdf().sample(context, there, dr.select(way.refracted, mi.Float(1), 0),
                                          mi.Point2f(0.5), there.is_valid())
     passed *= sample.pdf
     ray = there.spawn_ray(there.to_world(sample.wo))
-    out = _met(scene, ray, wanted, seeks & there.is_valid() & way.refracted)
+    out = met_shape(scene, ray, wanted, seeks & there.is_valid() & way.refracted)
     sample, more = out.bsdf().sample(context, out, 1, mi.Point2f(0.5), out.is_valid())
     passed = dr.select(way.refracted, passed * more * sample.pdf, passed)
     seeks &= there.is_valid() & (dr.max(passed) > 0)
@@ -259,12 +260,3 @@ def _centre(si: mi.SurfaceInteraction3f, seen: Seen) -> mi.SurfaceInteraction3f:
     centre = dr.zeros(mi.SurfaceInteraction3f)
     centre.p, centre.time, centre.wavelengths = seen.centre, si.time, si.wavelengths
     return centre
-
-
-def _met(scene: mi.Scene, ray: mi.Ray3f, shape: mi.UInt32,
-         active: mi.Bool) -> mi.SurfaceInteraction3f:
-    """Where a ray meets a shape that nothing hides; not valid where it does not."""
-    pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-    met = active & pi.is_valid()
-    met &= shape_index(pi.shape, met) == shape
-    return pi.compute_surface_interaction(ray, mi.RayFlags.All, met)
