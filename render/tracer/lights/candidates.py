@@ -27,7 +27,7 @@ import drjit as dr
 from onespp.render.mitsuba.variant import mi
 from onespp.render.tracer.sampler import Sampler
 
-from .panes import is_far, passage
+from .panes import passage
 from .reservoir import offered
 from .strata import power_heuristic
 
@@ -59,16 +59,17 @@ def sought_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
         choice = sampler.next_1d()
     total = mi.Float(0)
     kept, kept_luminance, place = mi.Color3f(0), mi.Float(0), mi.Point3f(0)
-    far, toward = (None, None) if panes is None else (mi.Bool(False), mi.Vector3f(0, 0, 1))
+    aim = None if panes is None else panes.no_aim()
     i = mi.UInt32(0)
     while dr.hint(i < candidates, exclude=[scene, sampler, context, bsdf, si, start, active, panes],
                   max_iterations=candidates, label="candidates"):
         y = start.y + GOLDEN * i  # each candidate is uniform for itself; together they spread
         point = mi.Point2f((start.x + i) / candidates, y - dr.floor(y))
         light, weight = scene.sample_emitter_direction(si, point, False, active)
+        tried = None
         if dr.hint(panes is not None, mode="scalar"):
             assert panes is not None
-            light, weight = panes.bent(si.p, light, weight, active)
+            light, weight, tried = panes.aimed(si.p, light, weight, active)
         value, p = bsdf.eval_pdf(context, si, si.to_local(light.d), active)
         w = dr.select(light.delta, 1, power_heuristic(light.pdf, p))
         c = dr.select(active & (light.pdf != 0), w * value * weight, 0)
@@ -79,13 +80,12 @@ def sought_light(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampler,
         kept_luminance = dr.select(taken, luminance, kept_luminance)
         place = dr.select(taken, light.p, place)
         if dr.hint(panes is not None, mode="scalar"):
-            far = dr.select(taken, is_far(light), far)
-            toward = dr.select(taken, light.d, toward)
+            aim = dr.select(taken, tried, aim)
         i += 1
     lit = active & (total > 0)
     scale = total / (kept_luminance * candidates)
     if dr.hint(panes is not None, mode="scalar"):
-        through = passage(scene, si, place, far, toward, panes, most, lit).through
+        through = passage(scene, si, aim, panes, most, lit).through
         return dr.select(lit, through * kept * scale, 0)
     shadowed = scene.ray_test(si.spawn_ray_to(place), lit)
     return dr.select(lit & ~shadowed, kept * scale, 0)

@@ -30,6 +30,17 @@ from .slabs import Slabs, find_slabs
 
 
 @dataclass
+class Aim:
+    """Of a shadow ray. point: of a light; far: in the sky. toward: the direction in which it leaves
+    the surface. which: slabs that it goes through, as of `Between`; None where there are none."""
+
+    point: mi.Point3f
+    far: mi.Bool
+    toward: mi.Vector3f
+    which: mi.UInt32 | None
+
+
+@dataclass
 class Panes:
     """What light goes through, of a scene as it stands. clear: by registry index, 1 for shapes that
     let it straight through. slabs: None where there are none."""
@@ -37,20 +48,25 @@ class Panes:
     clear: mi.UInt32
     slabs: Slabs | None
 
-    def bent(self, x: mi.Point3f, light: mi.DirectionSample3f, weight: mi.Color3f,
-             active: mi.Bool) -> tuple[mi.DirectionSample3f, mi.Color3f]:
+    def no_aim(self) -> Aim:
+        return Aim(mi.Point3f(0), mi.Bool(False), mi.Vector3f(0, 0, 1),
+                   None if self.slabs is None else mi.UInt32(0))
+
+    def aimed(self, x: mi.Point3f, light: mi.DirectionSample3f, weight: mi.Color3f, active: mi.Bool,
+              ) -> tuple[mi.DirectionSample3f, mi.Color3f, Aim]:
         """A point of a light and its radiance over density, by the way through slabs: its direction
-        and its density are of that. Points that shine are not seen through any, as by Mitsuba's
-        `path`."""
-        if self.slabs is None:
-            return light, weight
+        and its density are of that; and that way. Points that shine are not seen through any, as by
+        Mitsuba's `path`."""
         far = is_far(light)
+        if self.slabs is None:
+            return light, weight, Aim(light.p, far, light.d, None)
         between = self.slabs.between(x, light.d, light.dist, far, active)
         toward, ratio = between.bent(light.d, light.dist, far, light.n)
         seen = (ratio > 0) & (~light.delta | (between.which == 0))
         light = mi.DirectionSample3f(light)
         light.d, light.pdf = toward, dr.select(seen, light.pdf * ratio, 0)
-        return light, dr.select(seen, weight / ratio, 0)
+        return (light, dr.select(seen, weight / ratio, 0),
+                Aim(light.p, far, toward, between.which))
 
 
 def find_panes(stage: MitsubaScene) -> Panes | None:
@@ -82,15 +98,14 @@ class Passage:
 
 
 @dr.syntax
-def passage(scene: mi.Scene, si: mi.SurfaceInteraction3f, point: mi.Point3f, far: mi.Bool,
-            toward: mi.Vector3f, panes: Any, most: mi.UInt32, active: mi.Bool) -> Passage:
+def passage(scene: mi.Scene, si: mi.SurfaceInteraction3f, aim: Any, panes: Any, most: mi.UInt32,
+            active: mi.Bool) -> Passage:
     """From a surface to a light's point.
 
     Args:
-        far: whether the point is in the sky. toward: in what direction, of `Panes.bent`. panes:
-            `Panes`. most: faces that the ray may go through.
+        aim: of `Panes.aimed`. panes: `Panes`. most: faces that the ray may go through.
     """
-    which = mi.UInt32(0)
+    point, which = aim.point, aim.which
     through, distance = mi.Color3f(dr.select(active, 1, 0)), mi.Float(0)
     shape, face = mi.UInt32(0), mi.UInt32(0)
     has_slabs: bool = panes.slabs is not None
@@ -98,11 +113,8 @@ def passage(scene: mi.Scene, si: mi.SurfaceInteraction3f, point: mi.Point3f, far
     inside: Any = mi.UInt32(0) if has_slabs else None
     ray, left, going = si.spawn_ray_to(point), mi.UInt32(most), mi.Bool(active)
     if dr.hint(has_slabs, mode="scalar"):
-        straight = point - si.p
-        length = dr.norm(straight)
-        which = panes.slabs.between(si.p, straight / length, length, far, active).which
-        ray = dr.select(which != 0, si.spawn_ray(toward), ray)
-    while dr.hint(going, exclude=[scene, si, point, far, which, panes, has_slabs, active],
+        ray = dr.select(which != 0, si.spawn_ray(aim.toward), ray)
+    while dr.hint(going, exclude=[scene, si, aim, point, which, panes, has_slabs, active],
                   label="panes"):
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=going)
         met = going & pi.is_valid()
@@ -123,7 +135,7 @@ def passage(scene: mi.Scene, si: mi.SurfaceInteraction3f, point: mi.Point3f, far
             passes |= refracts & (dr.max(share) > 0)
             crossed |= dr.select(refracts, at.left, 0)
             inside = dr.select(refracts, dr.select(at.enters, at.slab, 0), inside)
-            is_bent = (which != 0) & (far | (crossed != which))
+            is_bent = (which != 0) & (aim.far | (crossed != which))
             d = dr.select(refracts, here.to_world(sample.wo), ray.d)
             onward = dr.select(is_bent, here.spawn_ray(d), onward)
         through *= dr.select(passes, share, dr.select(met, 0, 1))

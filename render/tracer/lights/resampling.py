@@ -51,7 +51,7 @@ from onespp.render.tracer.sampler import Sampler
 
 from .clusters import Clusters, light_of_cluster
 from .middles import Middles, middles_of
-from .panes import is_far, passage
+from .panes import passage
 from .reservoir import offered
 from .strata import light_point
 from .sun import SUN_BIT, Sun
@@ -188,7 +188,7 @@ def resample_lights(scene: mi.Scene, si: mi.SurfaceInteraction3f, sampler: Sampl
     lit = active & (dr.max(c) > 0)
     weight = point.weight(lights.share(stratum))
     if dr.hint(panes is not None, mode="scalar"):
-        between = passage(scene, si, light.p, is_far(light), light.d, panes, most, lit)
+        between = passage(scene, si, point.aim, panes, most, lit)
         shape, face, distance = between.shape, between.face, between.distance
         direct = dr.select(lit, between.through * weight * c / p, 0)
     else:

@@ -17,17 +17,19 @@ import drjit as dr
 
 from onespp.render.mitsuba.variant import mi
 
-from .panes import Panes
+from .panes import Aim, Panes
 from .sun import Sun
 
 
 @dataclass
 class LightPoint:
-    """c, the contribution of a point of a light; the point; and the BSDF's density toward it."""
+    """c, the contribution of a point of a light; the point; the BSDF's density toward it; and the
+    way there, of `Panes.aimed`, None where it is straight."""
 
     c: mi.Color3f
     light: mi.DirectionSample3f
     bsdf_pdf: mi.Float
+    aim: Aim | None = None
 
     def weight(self, share: mi.Float) -> mi.Float:
         """Of multiple importance sampling; share: of the light's density that counts."""
@@ -59,11 +61,12 @@ def light_point(scene: mi.Scene, si: mi.SurfaceInteraction3f, stratum: mi.UInt32
     light, weight = emitter.sample_direction(si, sample, active)
     if sun is not None:
         light, weight = sun.told_apart(scene, si, stratum, sample, light, weight, active)
+    aim = None
     if panes is not None:
-        light, weight = panes.bent(si.p, light, weight, active)
+        light, weight, aim = panes.aimed(si.p, light, weight, active)
     value, pdf = si.bsdf().eval_pdf(mi.BSDFContext(), si, si.to_local(light.d), active)
     c = dr.select(active & (light.pdf > 0), value * weight, 0) / dr.square(side)
-    return LightPoint(c, light, pdf)
+    return LightPoint(c, light, pdf, aim)
 
 
 def power_heuristic(p: mi.Float, q: mi.Float) -> mi.Float:
